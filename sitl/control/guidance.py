@@ -1,0 +1,31 @@
+"""What the onboard logic asks of the cascade for the next control steps."""
+
+from enum import IntEnum
+from typing import NamedTuple
+
+from sitl.control.reference import Trajectory
+
+
+class Effort(IntEnum):
+    """How far down the cascade is at work."""
+
+    OFF = 0  # motors stopped, flaps centred (disarmed)
+    IDLE = 1  # motors at their least thrust, integrators held at zero (armed, standing)
+    FLY = 2  # the whole cascade follows the trajectory
+
+
+class Guidance(NamedTuple):
+    """Effort, trajectory, and which of its derivatives bind on each axis.
+
+    follow_position_*: 0.0 lets go of the position on that axis (a velocity target).
+    follow_velocity_*: 0.0 lets go of velocity too (a pure acceleration target).
+    """
+
+    effort: int
+    trajectory: Trajectory
+    follow_position_north: float = 1.0
+    follow_position_east: float = 1.0
+    follow_position_down: float = 1.0
+    follow_velocity_north: float = 1.0
+    follow_velocity_east: float = 1.0
+    follow_velocity_down: float = 1.0
