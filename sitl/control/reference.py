@@ -3,8 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from sitl.jit import kernel
 
 DEGREE = 5
 
@@ -43,7 +44,7 @@ class Reference(NamedTuple):
     heading_rate_rad_s: float
 
 
-@njit(cache=True)
+@kernel
 def _evaluate(c: NDArray[np.float64], t: float) -> tuple[float, float, float, float]:
     """Value and first three derivatives of one axis' polynomial (Horner)."""
     x = ((((c[5] * t + c[4]) * t + c[3]) * t + c[2]) * t + c[1]) * t + c[0]
@@ -53,7 +54,7 @@ def _evaluate(c: NDArray[np.float64], t: float) -> tuple[float, float, float, fl
     return x, v, a, j
 
 
-@njit(cache=True)
+@kernel
 def sample(trajectory: Trajectory, t_s: float) -> Reference:
     """The trajectory at simulation time t_s."""
     start = trajectory.start_s

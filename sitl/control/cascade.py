@@ -1,0 +1,277 @@
+"""The cascade: position → velocity → pitch, lean and thrust → attitude → rate → allocation (paper section IV)."""
+
+import math
+from typing import NamedTuple
+
+from sitl.control.allocation import allocate
+from sitl.control.attitude import attitude_of, error_quaternion, error_yxz, rate_command, rates_of
+from sitl.control.feedforward import Trim, invert, refined
+from sitl.control.gains import Gains, Settings
+from sitl.control.guidance import Guidance
+from sitl.control.pid import integrated, smoothed
+from sitl.control.position import velocity_command
+from sitl.control.rate import moment
+from sitl.control.reference import Reference, sample
+from sitl.control.velocity import GRAVITY_M_S2, specific_force
+from sitl.jit import kernel
+from sitl.model.airframe import Airframe
+from sitl.navigation import NavState
+from sitl.quaternion import Quat, Vec3, rotate_back
+
+_LOOK_S = 0.01  # how far before and after now the reference is inverted for its attitude rates
+_POSITION_INTEGRAL_MAX = 5.0  # m s
+_VELOCITY_INTEGRAL_MAX = 10.0  # m
+_ANGLE_INTEGRAL_MAX = 1.0  # rad s
+_RATE_INTEGRAL_MAX = 2.0  # rad
+
+
+class Memory(NamedTuple):
+    """All that the cascade remembers from one control step to the next."""
+
+    position_integral: Vec3
+    velocity_integral: Vec3
+    attitude_integral: Vec3
+    rate_integral: Vec3
+    velocity_error_smoothed: Vec3
+    rate_error_smoothed: Vec3
+    reference_trim: Trim  # of the reference, where the next inversion starts
+    command_trim: Trim
+    flow_left_N: float  # thrust as it shapes the slipstream, after the motors' lag
+    flow_right_N: float
+    thrust_short: float
+    roll_short: float
+    pitch_short: float
+    yaw_short: float
+
+
+class Command(NamedTuple):
+    """What the cascade asks of actuators, and its inner targets (SI, radians; attitude target q_NB, rates in B)."""
+
+    qw: float
+    qx: float
+    qy: float
+    qz: float
+    p_rad_s: float
+    q_rad_s: float
+    r_rad_s: float
+    thrust_left_N: float
+    thrust_right_N: float
+    flap_left_rad: float
+    flap_right_rad: float
+    v_north_m_s: float
+    v_east_m_s: float
+    v_down_m_s: float
+    saturated: float
+
+
+@kernel
+def at_rest(a: Airframe, thrust_each_N: float) -> Memory:
+    """The memory of a cascade that has not flown yet, at the given thrust of each motor."""
+    zero = (0.0, 0.0, 0.0)
+    weight = a.mass_kg * GRAVITY_M_S2
+    hover = invert(a, (0.0, 0.0, -weight), zero, 0.0, 0.5 * math.pi, weight, 8)
+    return Memory(zero, zero, zero, zero, zero, zero, hover, hover, thrust_each_N, thrust_each_N, 0.0, 0.0, 0.0, 0.0)
+
+
+@kernel
+def standing_command(nav: NavState, thrust_each_N: float) -> Command:
+    """Motors at a given thrust, flaps centred: the vehicle stands, disarmed or idling."""
+    t = thrust_each_N
+    return Command(nav.qw, nav.qx, nav.qy, nav.qz, 0.0, 0.0, 0.0, t, t, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@kernel
+def _heading_frame(heading_rad: float, x: float, y: float, z: float) -> Vec3:
+    c, s = math.cos(heading_rad), math.sin(heading_rad)
+    return c * x + s * y, c * y - s * x, z
+
+
+@kernel
+def _reference_trim(a: Airframe, r: Reference, start: Trim, fresh_slope: bool) -> Trim:
+    """The trim that the reference's own velocity and acceleration need."""
+    m = a.mass_kg
+    force = _heading_frame(r.heading_rad, m * r.a_north_m_s2, m * r.a_east_m_s2, m * (r.a_down_m_s2 - GRAVITY_M_S2))
+    air = _heading_frame(r.heading_rad, r.v_north_m_s, r.v_east_m_s, r.v_down_m_s)
+    return refined(a, force, air, 0.0, start, fresh_slope)
+
+
+@kernel
+def _carried(r: Reference, h: float) -> Reference:
+    """The reference's velocity and acceleration h seconds on, at constant jerk."""
+    k = 0.5 * h * h
+    return Reference(
+        r.north_m, r.east_m, r.down_m,
+        r.v_north_m_s + h * r.a_north_m_s2 + k * r.j_north_m_s3,
+        r.v_east_m_s + h * r.a_east_m_s2 + k * r.j_east_m_s3,
+        r.v_down_m_s + h * r.a_down_m_s2 + k * r.j_down_m_s3,
+        r.a_north_m_s2 + h * r.j_north_m_s3,
+        r.a_east_m_s2 + h * r.j_east_m_s3,
+        r.a_down_m_s2 + h * r.j_down_m_s3,
+        r.j_north_m_s3, r.j_east_m_s3, r.j_down_m_s3,
+        r.heading_rad + h * r.heading_rate_rad_s, r.heading_rate_rad_s,
+    )  # fmt: skip
+
+
+@kernel
+def _difference(x: Vec3, y: Vec3) -> Vec3:
+    return x[0] - y[0], x[1] - y[1], x[2] - y[2]
+
+
+@kernel
+def _integrated(integral: Vec3, error: Vec3, dt_s: float, limit: float, held: tuple[bool, bool, bool]) -> Vec3:
+    return (
+        integrated(integral[0], error[0], dt_s, limit, held[0]),
+        integrated(integral[1], error[1], dt_s, limit, held[1]),
+        integrated(integral[2], error[2], dt_s, limit, held[2]),
+    )
+
+
+@kernel
+def _filtered_rate(smoothed_error: Vec3, error: Vec3, dt_s: float, tau_s: float) -> tuple[Vec3, Vec3]:
+    """(smoothed error, its rate): the derivative of `error` behind a first-order filter; tau 0: no derivative."""
+    if tau_s <= 0.0:
+        return error, (0.0, 0.0, 0.0)
+    new = (
+        smoothed(smoothed_error[0], error[0], dt_s, tau_s),
+        smoothed(smoothed_error[1], error[1], dt_s, tau_s),
+        smoothed(smoothed_error[2], error[2], dt_s, tau_s),
+    )
+    return new, (
+        (error[0] - new[0]) / tau_s,
+        (error[1] - new[1]) / tau_s,
+        (error[2] - new[2]) / tau_s,
+    )
+
+
+@kernel
+def cascade(
+    a: Airframe, gains: Gains, s: Settings, guidance: Guidance, m: Memory, nav: NavState, t_s: float, dt_s: float
+) -> tuple[Command, Memory, Reference]:
+    """One control step at simulation time t_s: actuator commands from the navigation state and the reference.
+
+    a: the airframe as the controller believes it to be.
+    """
+    q_NB: Quat = (nav.qw, nav.qx, nav.qy, nav.qz)
+    velocity = (nav.v_north_m_s, nav.v_east_m_s, nav.v_down_m_s)
+    rates = (nav.p_rad_s, nav.q_rad_s, nav.r_rad_s)
+    ref = sample(guidance.trajectory, t_s)
+    thrust_held = m.thrust_short > 0.0
+    tilt_held = m.pitch_short > 0.0 or m.yaw_short > 0.0
+
+    # position
+    fp = (guidance.follow_position_north, guidance.follow_position_east, guidance.follow_position_down)
+    position_error = (
+        fp[0] * (ref.north_m - nav.north_m),
+        fp[1] * (ref.east_m - nav.east_m),
+        fp[2] * (ref.down_m - nav.down_m),
+    )
+    reference_velocity = (ref.v_north_m_s, ref.v_east_m_s, ref.v_down_m_s)
+    # without velocity feed-forward the derivative acts on the measured velocity alone
+    k = s.feedforward_velocity
+    lag = (k * ref.v_north_m_s - velocity[0], k * ref.v_east_m_s - velocity[1], k * ref.v_down_m_s - velocity[2])
+    position_integral = _integrated(
+        m.position_integral, position_error, dt_s, _POSITION_INTEGRAL_MAX, (tilt_held, tilt_held, thrust_held)
+    )
+    v_ff = (
+        reference_velocity[0] if fp[0] == 0.0 else k * reference_velocity[0],
+        reference_velocity[1] if fp[1] == 0.0 else k * reference_velocity[1],
+        reference_velocity[2] if fp[2] == 0.0 else k * reference_velocity[2],
+    )
+    v_command = velocity_command(
+        gains.position,
+        position_error,
+        position_integral,
+        (fp[0] * lag[0], fp[1] * lag[1], fp[2] * lag[2]),
+        v_ff,
+        s.velocity_max_m_s,
+    )
+
+    # velocity
+    fv = (guidance.follow_velocity_north, guidance.follow_velocity_east, guidance.follow_velocity_down)
+    e = _difference(v_command, velocity)
+    velocity_error = (fv[0] * e[0], fv[1] * e[1], fv[2] * e[2])
+    velocity_integral = _integrated(
+        m.velocity_integral, velocity_error, dt_s, _VELOCITY_INTEGRAL_MAX, (tilt_held, tilt_held, thrust_held)
+    )
+    velocity_smoothed, velocity_error_rate = _filtered_rate(
+        m.velocity_error_smoothed, velocity_error, dt_s, s.velocity_d_tau_s
+    )
+    k = s.feedforward_acceleration
+    f = specific_force(
+        gains.velocity,
+        velocity_error,
+        velocity_integral,
+        velocity_error_rate,
+        (
+            ref.a_north_m_s2 if fv[0] == 0.0 else k * ref.a_north_m_s2,
+            ref.a_east_m_s2 if fv[1] == 0.0 else k * ref.a_east_m_s2,
+            ref.a_down_m_s2 if fv[2] == 0.0 else k * ref.a_down_m_s2,
+        ),
+        s.acceleration_max_m_s2,
+        s.lean_max_rad,
+    )
+    force_N = (a.mass_kg * f[0], a.mass_kg * f[1], a.mass_kg * f[2])
+
+    # body rates that the reference itself needs: its trim now, a moment ago and a moment ahead
+    now = _reference_trim(a, ref, m.reference_trim, True)
+    rates_ff = (0.0, 0.0, 0.0)
+    if s.feedforward_inverse > 0.0:
+        before = _reference_trim(a, _carried(ref, -_LOOK_S), now, False)
+        after = _reference_trim(a, _carried(ref, _LOOK_S), now, False)
+        pitch_rate = (after.pitch_rad - before.pitch_rad) / (2.0 * _LOOK_S)
+        lean_rate = (after.lean_rad - before.lean_rad) / (2.0 * _LOOK_S)
+        rates_ff = rates_of(now.lean_rad, now.pitch_rad, ref.heading_rate_rad_s, pitch_rate, lean_rate)
+
+    # pitch and lean: the attitude whose trim gives the wanted force at the present velocity
+    trim = refined(
+        a,
+        _heading_frame(ref.heading_rad, force_N[0], force_N[1], force_N[2]),
+        _heading_frame(ref.heading_rad, velocity[0], velocity[1], velocity[2]),
+        0.0,
+        m.command_trim,
+        True,
+    )
+    target = attitude_of(ref.heading_rad, trim.pitch_rad, trim.lean_rad)
+
+    # attitude
+    error = error_quaternion(q_NB, target) if s.quaternion_error > 0.0 else error_yxz(q_NB, target)
+    roll_held, pitch_held, yaw_held = m.roll_short > 0.0, m.pitch_short > 0.0, m.yaw_short > 0.0
+    held = (roll_held, pitch_held, yaw_held)
+    attitude_integral = _integrated(m.attitude_integral, error, dt_s, _ANGLE_INTEGRAL_MAX, held)
+    rate_target = rate_command(gains.attitude, error, attitude_integral, rates, rates_ff)
+
+    # rate
+    rate_error = _difference(rate_target, rates)
+    rate_integral = _integrated(m.rate_integral, rate_error, dt_s, _RATE_INTEGRAL_MAX, held)
+    rate_smoothed, rate_error_rate = _filtered_rate(m.rate_error_smoothed, rate_error, dt_s, s.rate_d_tau_s)
+    demand = moment(gains.rate, rate_error, rate_integral, rate_error_rate)
+
+    # allocation
+    force_x = rotate_back(q_NB, force_N)[0]
+    u, _, w = rotate_back(q_NB, velocity)
+    floor = 0.5 * s.slipstream_floor_N
+    x = allocate(a, force_x, demand, u, w, max(m.flow_left_N, floor), max(m.flow_right_N, floor), s.thrust_floor_N)
+    command = Command(
+        target[0], target[1], target[2], target[3],
+        rate_target[0], rate_target[1], rate_target[2],
+        x.thrust_left_N, x.thrust_right_N, x.flap_left_rad, x.flap_right_rad,
+        v_command[0], v_command[1], v_command[2],
+        max(max(x.thrust_short, x.roll_short), max(x.pitch_short, x.yaw_short)),
+    )  # fmt: skip
+    memory = Memory(
+        position_integral,
+        velocity_integral,
+        attitude_integral,
+        rate_integral,
+        velocity_smoothed,
+        rate_smoothed,
+        now,
+        trim,
+        smoothed(m.flow_left_N, x.thrust_left_N, dt_s, s.motor_tau_s),
+        smoothed(m.flow_right_N, x.thrust_right_N, dt_s, s.motor_tau_s),
+        x.thrust_short,
+        x.roll_short,
+        x.pitch_short,
+        x.yaw_short,
+    )
+    return command, memory, ref

@@ -1,0 +1,258 @@
+"""The vehicle: plant, cascade and onboard logic behind one face, stepped by simulation time alone.
+
+`advance` is a pure function of state, input and seed: the same seed and the same calls at the same simulation times
+give the same bits. Nothing in here reads a clock, a socket or the environment.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from sitl.closed_loop import (
+    NOISE_COLUMNS,
+    TRACE_COLUMNS,
+    Controller,
+    LoopState,
+    Observed,
+    Plant,
+    run,
+    start,
+)
+from sitl.control.gains import GAIN_NAMES, Settings, from_names
+from sitl.frames import standing
+from sitl.geodesy import GeoPoint
+from sitl.model.airframe import description as airframe_description
+from sitl.model.derivative import loads as plant_loads
+from sitl.model.rigid_body import GRAVITY_M_S2, State
+from sitl.model.wind import Wind
+from sitl.onboard.commander import Commander
+from sitl.onboard.declarations import declarations
+from sitl.onboard.events import EventLog
+from sitl.onboard.mission import Mission
+from sitl.onboard.offboard import Offboard
+from sitl.onboard.parameters import ParameterRefusal, Parameters
+from sitl.onboard.store import MemoryStore, Store
+from sitl.quaternion import Vec3
+from sitl.records import packed
+from sitl.snapshot import Battery, Snapshot
+from sitl.strict_yaml import ConfigError
+from sitl.vehicle_spec import VehicleSpec, load_vehicle, vehicle_names
+
+__all__ = ["DEFAULT_HOME", "Load", "Vehicle", "load_vehicle", "vehicle_names"]
+
+DEFAULT_HOME = GeoPoint(55.6985, 37.3595, 190.0)  # Skolkovo, where the paper's vehicle was built
+TICK_US = 20_000  # of the onboard logic
+_NO_TRACE = np.zeros((0, len(TRACE_COLUMNS)))
+_NO_NOISE = np.zeros((0, NOISE_COLUMNS))
+
+# a three-cell 2200 mAh pack, linear between full and empty; propulsion as a whole is half efficient
+_FULL_V, _EMPTY_V, _CAPACITY_MAH, _EFFICIENCY, _IDLE_W = 12.6, 10.5, 2200.0, 0.5, 3.0
+
+
+class Load(NamedTuple):
+    """One cause's force [N] and moment about the CM [N·m], in B."""
+
+    force_B: Vec3
+    moment_B: Vec3
+
+
+class Vehicle:
+    """One simulated YawSitter.
+
+    spec: what kind (load_vehicle). home: where world N has its origin and the vehicle stands at start, belly to
+    `heading_rad`. seed: of gusts and sensor noise. wind_N, gust_m_s: the air's motion [m/s]. store: where parameters
+    and plan persist (None: nowhere). overrides: parameter values set at start. Raises ConfigError for an override
+    that the parameter's declaration refuses.
+    """
+
+    def __init__(
+        self,
+        spec: VehicleSpec,
+        *,
+        home: GeoPoint = DEFAULT_HOME,
+        heading_rad: float = 0.0,
+        seed: int = 1,
+        wind_N: Vec3 = (0.0, 0.0, 0.0),
+        gust_m_s: float = 0.0,
+        store: Store | None = None,
+        overrides: Mapping[str, float] | None = None,
+    ) -> None:
+        self.spec, self.seed, self.heading_rad = spec, seed, heading_rad
+        self.step_us = spec.step_us
+        self.now_us = 0
+        self.events = EventLog()
+        store = store if store is not None else MemoryStore()
+        self.parameters = Parameters(declarations(spec.gains, spec.parameters), store, spec.name, self.events)
+        wind = {"SIM_WIND_N": wind_N[0], "SIM_WIND_E": wind_N[1], "SIM_WIND_D": wind_N[2], "SIM_GUST": gust_m_s}
+        for name, value in {**wind, **(overrides or {})}.items():
+            self._override(name, value)
+        self.mission = Mission(store, self.events)
+        self.offboard = Offboard(self.parameters)
+        self.commander = Commander(self.parameters, self.mission, self.offboard, self.events, home, heading_rad)
+        self._gear = spec.airframe.gear
+        self.reset()
+
+    def _override(self, name: str, value: float) -> None:
+        refusal = self.parameters.set(name, value)
+        if refusal is None:
+            return
+        if refusal is ParameterRefusal.UNKNOWN:
+            raise ConfigError(f"parameter {name}: unknown; `gcs param list` shows all {len(self.parameters.names)}")
+        d = self.parameters.declaration(name)
+        raise ConfigError(
+            f"parameter {name}: {value:g} refused ({refusal.name.lower().replace('_', ' ')}): "
+            f"allowed {d.minimum:g} … {d.maximum:g} {d.unit}".rstrip()
+        )
+
+    def reset(self) -> None:
+        """Back to standing at the start point, motors off; simulation time, parameters and plan stay."""
+        self._random = np.random.Generator(np.random.PCG64(self.seed))
+        self._generation = -1
+        self._build_constants()
+        q = standing(self.heading_rad, self._gear.standing_pitch_rad)
+        zero = (0.0, 0.0, 0.0)
+        state = State(*zero, *zero, *q, *zero, 0.0, 0.0, 0.0, 0.0)
+        self._loop: LoopState = start(self._controller, state)
+        self._energy_J = 0.0
+        self._power_W = _IDLE_W
+        self._snapshot: Snapshot | None = None
+        self._next_tick_us = self.now_us
+        self._guidance = self.commander.guidance
+        self._observed: Observed
+        self._run(0, _NO_TRACE)
+
+    def _build_constants(self) -> None:
+        """Plant and controller constants from the parameters in force; cheap to call where nothing changed."""
+        p = self.parameters
+        if p.generation == self._generation:
+            return
+        self._generation = p.generation
+        a = self.spec.airframe.airframe
+        wind = Wind(p["SIM_WIND_N"], p["SIM_WIND_E"], p["SIM_WIND_D"], p["SIM_GUST"])
+        plant = Plant(a, self._gear, self.spec.actuators, self.spec.sensors, wind, self.spec.substeps)
+        settings = Settings(
+            feedforward_velocity=float(p["FF_VELOCITY"]),
+            feedforward_acceleration=float(p["FF_ACCEL"]),
+            feedforward_inverse=float(p["FF_INVERSE"]),
+            quaternion_error=float(p["SYS_ATT_ERROR"]),
+            velocity_max_m_s=p["MPC_XY_VEL_MAX"],
+            acceleration_max_m_s2=p["CTL_ACC_MAX"],
+            velocity_d_tau_s=p["CTL_VEL_D_TAU"],
+            rate_d_tau_s=p["CTL_RATE_D_TAU"],
+            motor_tau_s=self.spec.actuators.motor_tau_s,
+            slipstream_floor_N=p["CTL_SLIP_FLOOR"] * a.mass_kg * GRAVITY_M_S2,
+            thrust_floor_N=p["CTL_THR_FLOOR"],
+            lean_max_rad=math.radians(p["MPC_TILTMAX_AIR"]),
+        )
+        self._controller = Controller(a, from_names({name: p[name] for name in GAIN_NAMES}), settings)
+        self._noisy = wind.gust_m_s > 0.0 or any(self.spec.sensors[:4])
+        self._plants, self._controllers = packed(plant), packed(self._controller)
+        self._wind = wind
+
+    def _run(self, steps: int, trace: np.ndarray[Any, np.dtype[np.float64]]) -> None:
+        noise = self._random.standard_normal((steps, NOISE_COLUMNS)) if self._noisy and steps else _NO_NOISE
+        self._loop, self._observed = run(
+            self._plants, self._controllers, self._guidance, self._loop, noise, self.now_us, self.step_us, steps, trace
+        )
+        self.now_us += steps * self.step_us
+        self.events.now_us = self.now_us
+
+    def advance(self, until_us: int, trace: np.ndarray[Any, np.dtype[np.float64]] | None = None) -> None:
+        """Run whole control steps up to simulation time `until_us`.
+
+        trace: (steps, len(TRACE_COLUMNS)) filled with a row for every control step of this call.
+        """
+        row = 0
+        while until_us - self.now_us >= self.step_us:
+            self._build_constants()
+            due = self.now_us >= self._next_tick_us
+            if due or self.commander.changed:
+                observed = self._observed
+                self._guidance = self.commander.tick(self.now_us, observed.nav, observed.feet_down)
+                if due:
+                    self._next_tick_us = self.now_us - self.now_us % TICK_US + TICK_US
+                    self._drain_battery()
+            # where the control period does not divide the tick, the tick comes with the first step after it
+            to_tick = -(-(self._next_tick_us - self.now_us) // self.step_us)
+            steps = max(1, min((until_us - self.now_us) // self.step_us, to_tick))
+            self._run(steps, trace[row : row + steps] if trace is not None else _NO_TRACE)
+            row += steps
+        self.commander.observe(self.now_us, self._observed.nav, self._observed.feet_down)
+
+    def _drain_battery(self) -> None:
+        s, a = self._loop.state, self.spec.airframe.airframe
+        cubes = abs(s.rotor_left_rad_s) ** 3 + abs(s.rotor_right_rad_s) ** 3
+        self._power_W = _IDLE_W + a.torque_coefficient * cubes / _EFFICIENCY
+        self._energy_J += self._power_W * TICK_US * 1e-6
+
+    def _battery(self) -> Battery:
+        used_mAh = self._energy_J / (0.5 * (_FULL_V + _EMPTY_V)) / 3.6
+        remaining = max(0.0, 1.0 - used_mAh / _CAPACITY_MAH)
+        voltage = _EMPTY_V + (_FULL_V - _EMPTY_V) * remaining
+        return Battery(voltage, self._power_W / voltage, remaining, used_mAh)
+
+    def snapshot(self) -> Snapshot:
+        """The vehicle now; built afresh only when time has moved or something has happened."""
+        last = self._snapshot
+        c, m, o = self.commander, self.mission, self._observed
+        mark = self.events.next_number
+        if last is not None and last.now_us == self.now_us and mark == self._snapshot_mark and not c.changed:
+            return last
+        self._snapshot_mark = mark
+        self._snapshot = Snapshot(
+            now_us=self.now_us,
+            truth=self._loop.state,
+            nav=o.nav,
+            acceleration_B=o.specific_force_B,
+            acceleration_N=o.acceleration_N,
+            wind_N=o.wind_N,
+            reference=o.reference,
+            command=o.command,
+            feet_down=o.feet_down,
+            mode=c.mode,
+            armed=c.armed,
+            landed=c.landed,
+            tipped_over=c.tipped_over,
+            failsafe=c.failsafe,
+            ready_to_arm=c.ready_to_arm().ok,
+            origin=c.origin,
+            home=c.home,
+            home_N=c.home_N,
+            home_heading_rad=c.home_heading_rad,
+            mission_state=m.state,
+            mission_current=m.current,
+            mission_total=len(m.items),
+            plan_id=m.plan_id,
+            battery=self._battery(),
+        )
+        return self._snapshot
+
+    def loads(self) -> dict[str, Load]:
+        """Forces and moments on the vehicle now, by cause."""
+        x = plant_loads(self.spec.airframe.airframe, self._gear, self._loop.state, self._observed.wind_N)
+        zero = (0.0, 0.0, 0.0)
+        return {
+            "gravity": Load(x.gravity_force, zero),
+            "thrust": Load(x.thrust_force, x.thrust_moment),
+            "side_force": Load(x.side_force, zero),
+            "aero": Load(x.wing_force, x.wing_moment),
+            "flaps": Load(x.flap_force, x.flap_moment),
+            "drag": Load(x.drag_force, zero),
+            "ground": Load(x.ground_force, x.ground_moment),
+        }
+
+    def description(self) -> dict[str, Any]:
+        """What this vehicle is, as plain data: airframe with units and sources, gains, actuators, sensors."""
+        spec = self.spec
+        return {
+            "name": spec.name,
+            "description": spec.description,
+            "airframe": airframe_description(spec.airframe),
+            "gains": spec.gains_name,
+            "actuators": spec.actuators._asdict(),
+            "sensors": spec.sensors._asdict(),
+            "control_rate_hz": spec.control_rate_hz,
+            "seed": self.seed,
+        }
