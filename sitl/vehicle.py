@@ -118,7 +118,9 @@ class Vehicle:
         self._energy_J = 0.0
         self._power_W = _IDLE_W
         self._snapshot: Snapshot | None = None
+        self._snapshot_mark = -1
         self._next_tick_us = self.now_us
+        self.commander.restart(self.heading_rad)
         self._guidance = self.commander.guidance
         self._observed: Observed
         self._run(0, _NO_TRACE)

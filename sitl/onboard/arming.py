@@ -1,0 +1,31 @@
+"""Pre-arm checks: what must be true before the motors may run, each with the sentence that says what is not."""
+
+from typing import NamedTuple
+
+from sitl.onboard.modes import ACCEPTED, Outcome, Verdict
+
+
+class Condition(NamedTuple):
+    """What arming depends on."""
+
+    tipped_over: bool
+    standing: bool
+    moving: bool
+    terminated: bool
+
+
+_CHECKS = (
+    ("terminated", "flight was terminated: reboot first"),
+    ("tipped_over", "the vehicle has tipped over"),
+    ("moving", "the vehicle is moving"),
+)
+
+
+def check(condition: Condition) -> Outcome:
+    """ACCEPTED, or the first check that fails."""
+    for field, sentence in _CHECKS:
+        if getattr(condition, field):
+            return Outcome(Verdict.TEMPORARILY_REJECTED, sentence)
+    if not condition.standing:
+        return Outcome(Verdict.TEMPORARILY_REJECTED, "the vehicle does not stand on its feet")
+    return ACCEPTED

@@ -1,0 +1,142 @@
+"""Every parameter of the vehicle: name, unit, range, default, group and meaning, said once.
+
+Names that PX4 has mean here what they mean there. The 36 gains are {POS,VEL,ATT,RATE}_{X,Y,Z}_{P,I,D}; they differ in
+name only by loop, axis and the last letter, and never change their names again.
+"""
+
+from collections.abc import Mapping, Sequence
+
+from sitl.onboard.parameters import Declaration
+
+_AXES = {
+    "POS": {"X": "north", "Y": "east", "Z": "down"},
+    "VEL": {"X": "north", "Y": "east", "Z": "down"},
+    "ATT": {
+        "X": "paper's roll φ about the nose: MAVLink minus yaw in hover",
+        "Y": "paper's pitch θ: MAVLink pitch in hover",
+        "Z": "paper's yaw ψ, by differential thrust: MAVLink roll in hover",
+    },
+    "RATE": {
+        "X": "roll rate P about the nose: MAVLink minus yawspeed in hover",
+        "Y": "pitch rate Q: MAVLink pitchspeed in hover",
+        "Z": "yaw rate R, by differential thrust: MAVLink rollspeed in hover",
+    },
+}
+_LOOPS = {
+    "POS": ("position error to velocity", {"P": "1/s", "I": "1/s^2", "D": ""}, 100.0),
+    "VEL": ("velocity error to acceleration", {"P": "1/s", "I": "1/s^2", "D": ""}, 100.0),
+    "ATT": ("attitude error to body rate", {"P": "1/s", "I": "1/s^2", "D": ""}, 100.0),
+    "RATE": ("body rate error to moment", {"P": "N.m.s", "I": "N.m", "D": "N.m.s^2"}, 10.0),
+}
+_TERMS = {"P": "Proportional", "I": "Integral", "D": "Derivative"}
+
+
+def _gains(defaults: Mapping[str, float]) -> list[Declaration]:
+    return [
+        Declaration(
+            f"{loop}_{axis}_{term}", False, defaults[f"{loop}_{axis}_{term}"], 0.0, highest, units[term],
+            f"Gains {loop}", f"{_TERMS[term]} gain, {what}, {axis} axis", f"Axis {axis}: {_AXES[loop][axis]}.",
+        )
+        for loop, (what, units, highest) in _LOOPS.items()
+        for axis in "XYZ"
+        for term in "PID"
+    ]  # fmt: skip
+
+
+def _real(
+    name: str,
+    default: float,
+    low: float,
+    high: float,
+    unit: str,
+    group: str,
+    short: str,
+    long: str = "",
+    kept: bool = True,
+) -> Declaration:
+    return Declaration(name, False, default, low, high, unit, group, short, long, persistent=kept)
+
+
+def _choice(name: str, default: int, group: str, short: str, values: tuple[tuple[int, str], ...]) -> Declaration:
+    numbers = [number for number, _ in values]
+    return Declaration(name, True, default, min(numbers), max(numbers), "", group, short, values=values)
+
+
+_OFF_ON = ((0, "off"), (1, "on"))
+_LOSS_ACTIONS = ((0, "Hold"), (1, "Land"), (2, "Return"))
+
+_TABLE = (
+    # flight limits of the trajectory generator
+    _real("MPC_XY_CRUISE", 3.0, 0.1, 10.0, "m/s", "Flight", "Horizontal cruise speed"),
+    _real("MPC_XY_VEL_MAX", 6.0, 0.5, 20.0, "m/s", "Flight", "Largest velocity command, each axis"),
+    _real("MPC_Z_V_AUTO_UP", 2.0, 0.1, 5.0, "m/s", "Flight", "Climb speed"),
+    _real("MPC_Z_V_AUTO_DN", 1.0, 0.1, 4.0, "m/s", "Flight", "Descent speed"),
+    _real("MPC_LAND_SPEED", 0.5, 0.1, 2.0, "m/s", "Flight", "Descent speed near the ground"),
+    _real("MPC_ACC_HOR", 1.2, 0.1, 5.0, "m/s^2", "Flight", "Horizontal acceleration"),
+    _real("MPC_ACC_UP_MAX", 2.0, 0.1, 5.0, "m/s^2", "Flight", "Upward acceleration"),
+    _real("MPC_ACC_DOWN_MAX", 1.0, 0.1, 5.0, "m/s^2", "Flight", "Downward acceleration"),
+    _real("MPC_JERK_AUTO", 4.0, 0.5, 50.0, "m/s^3", "Flight", "Jerk"),
+    _real("MPC_YAWRAUTO_MAX", 45.0, 5.0, 180.0, "deg/s", "Flight", "Heading rate"),
+    _real("MPC_TILTMAX_AIR", 40.0, 5.0, 60.0, "deg", "Flight", "Largest tilt of the thrust from the vertical"),
+    # missions and modes
+    _real("MIS_TAKEOFF_ALT", 2.5, 0.5, 120.0, "m", "Mission", "Take-off height above home where none is given"),
+    _real("NAV_ACC_RAD", 0.5, 0.05, 50.0, "m", "Mission", "Acceptance radius of a waypoint that gives none"),
+    _real("RTL_RETURN_ALT", 5.0, 1.0, 150.0, "m", "Mission", "Least height above home on the way back"),
+    # what happens when something goes missing
+    _real("COM_OF_LOSS_T", 0.5, 0.1, 60.0, "s", "Failsafe", "Age of lost offboard targets (simulation time)"),
+    _choice("COM_OBL_RC_ACT", 0, "Failsafe", "Action when offboard targets are lost", _LOSS_ACTIONS),
+    _real("COM_DL_LOSS_T", 10.0, 1.0, 300.0, "s", "Failsafe", "Silence of lost ground stations (wall time)"),
+    _choice("NAV_DLL_ACT", 0, "Failsafe", "Action when all ground stations are lost",
+            ((0, "none"), (1, "Hold"), (2, "Return"), (3, "Land"))),
+    _real("COM_DISARM_LAND", 2.0, 0.0, 60.0, "s", "Failsafe", "Time on the ground until disarming after a landing"),
+    _real("COM_MAN_LOSS_T", 0.5, 0.1, 10.0, "s", "Failsafe", "Age of lost stick inputs (simulation time)"),
+    # the cascade beside its gains
+    _choice("SYS_ATT_ERROR", 1, "Cascade", "Attitude error", ((0, "paper's YXZ angles"), (1, "quaternion"))),
+    _choice("FF_VELOCITY", 1, "Cascade", "Feed-forward of the reference's velocity", _OFF_ON),
+    _choice("FF_ACCEL", 1, "Cascade", "Feed-forward of the reference's acceleration", _OFF_ON),
+    _choice("FF_INVERSE", 1, "Cascade", "Feed-forward of attitude rates from the trim's inverse model", _OFF_ON),
+    _real("CTL_ACC_MAX", 6.0, 0.5, 9.0, "m/s^2", "Cascade", "Largest acceleration command"),
+    _real("CTL_VEL_D_TAU", 0.05, 0.0, 1.0, "s", "Cascade", "Filter of the velocity loop's derivative; 0: none"),
+    _real("CTL_RATE_D_TAU", 0.0, 0.0, 1.0, "s", "Cascade", "Filter of the rate loop's derivative; 0: no derivative",
+          "The printed rate derivative diverges unless it is filtered (loop gain 3 to 20) and is off by default."),
+    _real("CTL_SLIP_FLOOR", 1.0, 0.1, 2.0, "", "Cascade", "Least flap pressure believed, as a share of hover's",
+          "The paper keeps the slipstream estimate from falling below hover's."),
+    _real("CTL_THR_FLOOR", 2.0, 1.0, 8.0, "N", "Cascade", "Least total thrust in flight"),
+    # the simulation
+    _real("SIM_SPEED", 1.0, 0.0, 1000.0, "", "Simulation", "Simulated seconds per second; 0: fastest", kept=False),
+    Declaration("SIM_PAUSE", True, 0, 0, 1, "", "Simulation", "Simulation stands still", values=_OFF_ON,
+                persistent=False),
+    Declaration("SIM_STEP_MS", True, 0, 0, 60000, "ms", "Simulation", "While paused: run on by so much, then reads 0",
+                persistent=False),
+    _real("SIM_WIND_N", 0.0, -30.0, 30.0, "m/s", "Simulation", "Wind: the air's motion to the north", kept=False),
+    _real("SIM_WIND_E", 0.0, -30.0, 30.0, "m/s", "Simulation", "Wind: the air's motion to the east", kept=False),
+    _real("SIM_WIND_D", 0.0, -30.0, 30.0, "m/s", "Simulation", "Wind: the air's motion downward", kept=False),
+    _real("SIM_GUST", 0.0, 0.0, 10.0, "m/s", "Simulation", "Standard deviation of horizontal Dryden gusts", kept=False),
+    _real("SIM_TLM_RATE", 50.0, 1.0, 500.0, "Hz", "Simulation", "Rate of the telemetry fan-out (simulation time)"),
+)  # fmt: skip
+
+
+def declarations(gain_defaults: Mapping[str, float], extra_defaults: Mapping[str, float]) -> list[Declaration]:
+    """All declarations: the gains with a vehicle's own defaults, and the table with those of `extra_defaults` changed.
+
+    Raises KeyError for a name in `extra_defaults` that is not declared.
+    """
+    table = {d.name: d for d in (*_gains(gain_defaults), *_TABLE)}
+    for name, default in extra_defaults.items():
+        table[name] = table[name]._replace(default=default)
+    return list(table.values())
+
+
+def as_markdown(declared: Sequence[Declaration]) -> str:
+    """The parameters as a table for docs/parameters.md."""
+    lines = ["| name | type | default | range | unit | meaning |", "|---|---|---|---|---|---|"]
+    group = ""
+    for d in sorted(declared, key=lambda d: d.group):
+        if d.group != group:
+            group = d.group
+            lines.append(f"| **{group}** | | | | | |")
+        kind = "int" if d.is_int else "float"
+        allowed = ", ".join(f"{n} {text}" for n, text in d.values) or f"{d.minimum:g} … {d.maximum:g}"
+        meaning = f"{d.short}. {d.long}".strip() if d.long else d.short
+        lines.append(f"| `{d.name}` | {kind} | {d.default:g} | {allowed} | {d.unit} | {meaning} |")
+    return "\n".join(lines) + "\n"

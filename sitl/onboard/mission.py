@@ -1,0 +1,271 @@
+"""The stored mission: items exactly as they came, checked before they replace the old ones, kept across restarts."""
+
+import math
+import struct
+import zlib
+from collections.abc import Callable, Sequence
+from enum import IntEnum
+from typing import NamedTuple
+
+import msgspec
+
+from sitl.onboard.events import EventLog
+from sitl.onboard.modes import ACCEPTED, EventKind, Outcome, Severity, Verdict
+from sitl.onboard.store import Store
+
+CAPACITY = 10_000
+_FILE = "mission.json"
+_PACKED = struct.Struct("<BHBB4fiifB")
+
+
+class Frame(IntEnum):
+    """MAV_FRAME, those in which an item may come."""
+
+    GLOBAL = 0
+    LOCAL_NED = 1
+    MISSION = 2
+    GLOBAL_RELATIVE_ALT = 3
+    GLOBAL_INT = 5
+    GLOBAL_RELATIVE_ALT_INT = 6
+
+
+class ItemCommand(IntEnum):
+    """MAV_CMD, those that a mission may hold."""
+
+    WAYPOINT = 16
+    LOITER_UNLIMITED = 17
+    LOITER_TURNS = 18
+    LOITER_TIME = 19
+    RETURN_TO_LAUNCH = 20
+    LAND = 21
+    TAKEOFF = 22
+    SPLINE_WAYPOINT = 82
+    VTOL_TAKEOFF = 84
+    VTOL_LAND = 85
+    DELAY = 93
+    CONDITION_DELAY = 112
+    CONDITION_DISTANCE = 114
+    CONDITION_YAW = 115
+    DO_JUMP = 177
+    DO_CHANGE_SPEED = 178
+    DO_SET_HOME = 179
+    DO_LAND_START = 189
+    DO_SET_ROI_LOCATION = 195
+    DO_SET_ROI_NONE = 197
+    DO_SET_ROI = 201
+    DO_VTOL_TRANSITION = 3000
+
+
+class MissionState(IntEnum):
+    """MISSION_STATE."""
+
+    UNKNOWN = 0
+    NO_MISSION = 1
+    NOT_STARTED = 2
+    ACTIVE = 3
+    PAUSED = 4
+    COMPLETE = 5
+
+
+class MissionItem(NamedTuple):
+    """MISSION_ITEM_INT's fields, verbatim. x, y: degE7, or 1e-4 m in LOCAL_NED; z: metres."""
+
+    frame: int
+    command: int
+    current: int
+    autocontinue: int
+    param1: float
+    param2: float
+    param3: float
+    param4: float
+    x: int
+    y: int
+    z: float
+    mission_type: int = 0
+
+
+class Fault(NamedTuple):
+    """What is wrong with a plan: the item, its field (frame, command, param1 … param7, or total), and why."""
+
+    index: int  # type: ignore[assignment]
+    field: str
+    reason: str
+
+
+_WITH_PLACE = {
+    ItemCommand.WAYPOINT,
+    ItemCommand.LOITER_UNLIMITED,
+    ItemCommand.LOITER_TURNS,
+    ItemCommand.LOITER_TIME,
+    ItemCommand.TAKEOFF,
+    ItemCommand.LAND,
+    ItemCommand.SPLINE_WAYPOINT,
+    ItemCommand.VTOL_TAKEOFF,
+    ItemCommand.VTOL_LAND,
+}
+_FAR_M = 10_000.0
+
+
+def has_place(item: MissionItem) -> bool:
+    """Whether the item's x, y, z name a point to fly to."""
+    return item.command in _WITH_PLACE and item.frame != Frame.MISSION
+
+
+def _place(item: MissionItem) -> tuple[str, str] | None:
+    if item.command not in _WITH_PLACE:
+        return None
+    if item.frame == Frame.MISSION:
+        return "frame", "an item with a position needs a frame with coordinates"
+    if not math.isfinite(item.z):
+        return "param7", "altitude is not finite"
+    if abs(item.z) > _FAR_M:
+        return "param7", "altitude is beyond 10 km"
+    if item.frame == Frame.LOCAL_NED:
+        for field, value in (("param5", item.x), ("param6", item.y)):
+            if abs(value) > _FAR_M * 1e4:
+                return field, "further than 10 km"
+    else:
+        if abs(item.x) > 900_000_000:
+            return "param5", "latitude beyond ±90°"
+        if abs(item.y) > 1_800_000_000:
+            return "param6", "longitude beyond ±180°"
+    return None
+
+
+def _range(name: str, low: float, high: float, nan_ok: bool = True) -> Callable[[MissionItem], tuple[str, str] | None]:
+    def check(item: MissionItem) -> tuple[str, str] | None:
+        value = getattr(item, name)
+        if math.isnan(value):
+            return None if nan_ok else (name, "is not a number")
+        return None if low <= value <= high else (name, f"{value:g} is outside {low:g} … {high:g}")
+
+    return check
+
+
+# what each command's parameters must be, beside its place
+_RULES: dict[int, tuple[Callable[[MissionItem], tuple[str, str] | None], ...]] = {
+    ItemCommand.WAYPOINT: (_range("param1", 0, 65535), _range("param2", 0, 1000), _range("param3", -1000, 1000)),
+    ItemCommand.SPLINE_WAYPOINT: (_range("param1", 0, 65535),),
+    ItemCommand.LOITER_TIME: (_range("param1", 0, 65535, nan_ok=False), _range("param3", -1000, 1000)),
+    ItemCommand.LOITER_TURNS: (_range("param1", 0, 1000, nan_ok=False), _range("param3", -1000, 1000)),
+    ItemCommand.LOITER_UNLIMITED: (_range("param3", -1000, 1000),),
+    ItemCommand.DELAY: (_range("param1", -1, 86400, nan_ok=False),),
+    ItemCommand.CONDITION_DELAY: (_range("param1", 0, 86400, nan_ok=False),),
+    ItemCommand.CONDITION_DISTANCE: (_range("param1", 0, 1e6, nan_ok=False),),
+    ItemCommand.CONDITION_YAW: (_range("param1", -360, 360, nan_ok=False),),
+    ItemCommand.DO_CHANGE_SPEED: (_range("param2", -2, 50),),
+    ItemCommand.DO_JUMP: (_range("param2", -1, 32767, nan_ok=False),),
+    ItemCommand.DO_VTOL_TRANSITION: (_range("param1", 3, 3, nan_ok=False),),
+}
+
+
+def check_item(item: MissionItem, total: int) -> tuple[str, str] | None:
+    """The field at fault and why, or None. `total`: how many items the plan has."""
+    if item.frame not in Frame._value2member_map_:
+        return "frame", f"frame {item.frame} is not supported"
+    if item.command not in ItemCommand._value2member_map_:
+        return "command", f"command {item.command} is not supported in a mission"
+    for name in ("param1", "param2", "param3", "param4"):
+        if math.isinf(getattr(item, name)):
+            return name, "is infinite"
+    fault = _place(item)
+    for rule in _RULES.get(item.command, ()):
+        fault = fault or rule(item)
+    if fault is None and item.command == ItemCommand.DO_JUMP:
+        target = item.param1
+        if not (math.isfinite(target) and 0 <= target < total and target == int(target)):
+            return "param1", f"no item {target:g} to jump to"
+    return fault
+
+
+class Mission:
+    """The plan in force and how far it has come. `current` is the item being flown, or flown next."""
+
+    def __init__(self, store: Store, events: EventLog) -> None:
+        self._store, self._events = store, events
+        self.items: tuple[MissionItem, ...] = ()
+        self.plan_id = 0
+        self.current = 0
+        self.state = MissionState.NO_MISSION
+        self.revision = 0  # counts replacements and jumps from outside, for whoever is flying it
+        self._load()
+
+    def check(self, items: Sequence[MissionItem]) -> Fault | None:
+        """The first thing wrong with a plan, or None."""
+        if len(items) > CAPACITY:
+            return Fault(CAPACITY, "total", f"more than {CAPACITY} items")
+        for index, item in enumerate(items):
+            fault = check_item(item, len(items))
+            if fault is not None:
+                return Fault(index, *fault)
+        return None
+
+    def replace(self, items: Sequence[MissionItem]) -> Fault | None:
+        """Take a new plan as a whole, persisted first; on a fault the old one stays whole."""
+        fault = self.check(items)
+        if fault is not None:
+            return fault
+        try:
+            self._store.write(_FILE, msgspec.json.encode([list(_finite_or_none(item)) for item in items]))
+        except OSError as error:
+            return Fault(0, "total", f"not saved: {error.strerror}")
+        self._adopt(tuple(items))
+        self._events.add(EventKind.MISSION, Severity.INFO, f"mission of {len(items)} items", len(items))
+        return None
+
+    def clear(self) -> None:
+        self.replace(())
+
+    def set_current(self, index: int, reset: bool = False) -> Outcome:
+        """Go on from item `index`; with `reset` a completed mission counts as not started."""
+        if not 0 <= index < len(self.items):
+            return Outcome(Verdict.DENIED, f"no mission item {index}: there are {len(self.items)}")
+        self.current = index
+        self.revision += 1
+        if reset or self.state is MissionState.COMPLETE:
+            self.state = MissionState.NOT_STARTED
+        self._events.add(EventKind.ITEM_CURRENT, Severity.INFO, f"mission item {index}", index)
+        return ACCEPTED
+
+    def _adopt(self, items: tuple[MissionItem, ...]) -> None:
+        self.items = items
+        self.current = 0
+        self.revision += 1
+        self.state = MissionState.NOT_STARTED if items else MissionState.NO_MISSION
+        crc = 0
+        for seq, i in enumerate(items):
+            crc = zlib.crc32(
+                _PACKED.pack(
+                    i.frame, i.command, 0, i.autocontinue, i.param1, i.param2, i.param3, i.param4, i.x, i.y, i.z,
+                    i.mission_type,
+                )
+                + seq.to_bytes(2, "little"),
+                crc,
+            )  # fmt: skip
+        self.plan_id = crc
+
+    def _load(self) -> None:
+        data = self._store.read(_FILE)
+        if data is None:
+            return
+        try:
+            rows = msgspec.json.decode(data, type=list[tuple[int | float | None, ...]])
+            items = tuple(MissionItem(*_nan_for_none(row)) for row in rows)  # type: ignore[arg-type]
+            fault = self.check(items)
+        except (msgspec.DecodeError, TypeError, ValueError):
+            fault, items = Fault(0, "total", "unreadable"), ()
+        if fault is not None:
+            self._store.set_aside(_FILE)
+            self._events.tell(Severity.WARNING, f"stored mission set aside: item {fault.index}: {fault.reason}")
+            return
+        self._adopt(items)
+
+
+def _finite_or_none(item: MissionItem) -> tuple[int | float | None, ...]:
+    """JSON has no NaN; an unset parameter is null there."""
+    return tuple(None if isinstance(x, float) and math.isnan(x) else x for x in item)
+
+
+def _nan_for_none(row: Sequence[int | float | None]) -> list[int | float]:
+    values = [math.nan if x is None else x for x in row]
+    return [float(x) if 4 <= k <= 7 or k == 10 else int(x) for k, x in enumerate(values)]

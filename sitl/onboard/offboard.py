@@ -1,0 +1,146 @@
+"""Targets streamed from outside: their age, and the smooth reference made of them."""
+
+import math
+from collections import deque
+from typing import NamedTuple
+
+import numpy as np
+
+from sitl.control.reference import DEGREE, Trajectory
+from sitl.onboard.modes import ACCEPTED, Outcome, Verdict
+from sitl.onboard.parameters import Parameters
+from sitl.quaternion import Vec3
+
+_STAMP_WINDOW_US = 1_000_000  # a stamp further than this from now is not of the vehicle's clock
+_CARRY_S = 0.2  # a target is carried forward by this much at most
+_SPACING_S = (0.005, 0.2)  # of two targets whose accelerations tell a jerk
+_JERK_MAX = 20.0  # m/s³
+_STREAM_GAP_US = 500_000  # more than 2 Hz
+_STREAM_SPAN_US = 1_000_000
+_NONE: Vec3 = (math.nan, math.nan, math.nan)
+
+
+def _or_zero(x: float) -> float:
+    return 0.0 if math.isnan(x) else x
+
+
+class OffboardTarget(NamedTuple):
+    """Where to be and how to move, in N and SI. NaN on an axis: that quantity does not bind there.
+
+    stamp_us: the instant on the vehicle's clock for which the target holds; None: unknown.
+    """
+
+    stamp_us: int | None
+    position_N: Vec3 = _NONE
+    velocity_N: Vec3 = _NONE
+    acceleration_N: Vec3 = _NONE
+    heading_rad: float = math.nan
+    heading_rate_rad_s: float = math.nan
+
+
+class Offboard:
+    """The newest target, whether a stream of them is alive, and the trajectory they make.
+
+    `trajectory` and `follow` change with every target; `number` counts them.
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._parameters = parameters
+        self._arrivals: deque[int] = deque(maxlen=64)
+        self.target: OffboardTarget | None = None
+        self.number = 0
+        self._stamp_us = 0
+        self._jerk: Vec3 = (0.0, 0.0, 0.0)
+
+    def submit(self, target: OffboardTarget, now_us: int) -> Outcome:
+        """Take a target that arrives now. Refused when it is infinite somewhere or binds nothing."""
+        numbers = (*target.position_N, *target.velocity_N, *target.acceleration_N)
+        if any(math.isinf(x) for x in (*numbers, target.heading_rad, target.heading_rate_rad_s)):
+            return Outcome(Verdict.DENIED, "offboard target is infinite")
+        if all(math.isnan(x) for x in (*numbers, target.heading_rad, target.heading_rate_rad_s)):
+            return Outcome(Verdict.DENIED, "offboard target ignores everything")
+        if any(abs(x) > 1e6 for x in numbers if not math.isnan(x)):
+            return Outcome(Verdict.DENIED, "offboard target is further than 1000 km or faster than sense")
+        stamp = target.stamp_us
+        if stamp is None or abs(now_us - stamp) > _STAMP_WINDOW_US:
+            stamp = now_us
+        self._jerk = self._estimated_jerk(target, stamp)
+        self.target, self._stamp_us = target, stamp
+        self._arrivals.append(now_us)
+        self.number += 1
+        return ACCEPTED
+
+    def _estimated_jerk(self, target: OffboardTarget, stamp_us: int) -> Vec3:
+        last = self.target
+        spacing = (stamp_us - self._stamp_us) * 1e-6
+        if last is None or not _SPACING_S[0] <= spacing <= _SPACING_S[1]:
+            return (0.0, 0.0, 0.0)
+        jerk = []
+        for old, new in zip(last.acceleration_N, target.acceleration_N, strict=True):
+            j = (new - old) / spacing
+            jerk.append(0.0 if math.isnan(j) else max(-_JERK_MAX, min(_JERK_MAX, j)))
+        return jerk[0], jerk[1], jerk[2]
+
+    def age_s(self, now_us: int) -> float:
+        """Simulation time since the newest target arrived; inf if none ever did."""
+        return (now_us - self._arrivals[-1]) * 1e-6 if self._arrivals else math.inf
+
+    def lost(self, now_us: int) -> bool:
+        return self.age_s(now_us) > self._parameters["COM_OF_LOSS_T"]
+
+    def streaming(self, now_us: int) -> bool:
+        """Whether targets have come at more than 2 Hz for the last second."""
+        last = now_us
+        for arrival in reversed(self._arrivals):
+            if last - arrival > _STREAM_GAP_US:
+                return False
+            last = arrival
+            if now_us - arrival >= _STREAM_SPAN_US:
+                return True
+        return bool(self._arrivals) and len(self._arrivals) == self._arrivals.maxlen
+
+    @property
+    def moving(self) -> bool:
+        """Whether the newest target carries a velocity or an acceleration, so that its trajectory ends in motion."""
+        t = self.target
+        return t is not None and any(_or_zero(x) != 0.0 for x in (*t.velocity_N, *t.acceleration_N))
+
+    def trajectory(self, now_us: int, heading_rad: float, nav_position_N: Vec3) -> Trajectory:
+        """The newest target as a trajectory: x = p + v τ + a τ²/2 + j τ³/6 with τ the time since its stamp, τ ≤ 0.2 s.
+
+        heading_rad: what a target without heading keeps. An axis without position starts at nav_position_N.
+        """
+        target = self.target
+        if target is None:
+            raise ValueError("there is no offboard target yet")
+        c = np.zeros((1, 4, DEGREE + 1))
+        early = max(0.0, (self._stamp_us - now_us) * 1e-6)  # a stamp ahead of now: begin now, on the same polynomial
+        for i in range(3):
+            p, v, a = target.position_N[i], target.velocity_N[i], target.acceleration_N[i]
+            p, v, a = nav_position_N[i] if math.isnan(p) else p, _or_zero(v), _or_zero(a)
+            j = self._jerk[i]
+            c[0, i, 0] = p - early * (v - early * (a / 2.0 - early * j / 6.0))
+            c[0, i, 1] = v - early * (a - early * j / 2.0)
+            c[0, i, 2] = (a - early * j) / 2.0
+            c[0, i, 3] = j / 6.0
+        rate = _or_zero(target.heading_rate_rad_s)
+        c[0, 3, 0] = (heading_rad if math.isnan(target.heading_rad) else target.heading_rad) - early * rate
+        c[0, 3, 1] = rate
+        start = self._stamp_us * 1e-6
+        return Trajectory(np.array([start - early]), c, start + _CARRY_S)
+
+    def follow(self) -> tuple[float, float, float, float, float, float]:
+        """Guidance's follow flags: position then velocity, per axis.
+
+        An axis with a position follows position and velocity; one with a velocity alone lets go of the position; one
+        with an acceleration alone lets go of both.
+        """
+        target = self.target
+        if target is None:
+            return (1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
+        positions = [0.0 if math.isnan(p) else 1.0 for p in target.position_N]
+        velocities = [
+            0.0 if p == 0.0 and math.isnan(v) and not math.isnan(a) else 1.0
+            for p, v, a in zip(positions, target.velocity_N, target.acceleration_N, strict=True)
+        ]
+        return (positions[0], positions[1], positions[2], velocities[0], velocities[1], velocities[2])

@@ -1,0 +1,69 @@
+"""Where parameters and the plan outlive the process."""
+
+import os
+import tempfile
+from pathlib import Path
+from typing import Protocol
+
+
+class Store(Protocol):
+    """Named blobs. `write` replaces a blob as a whole: a reader finds the old one or the new one, never a part."""
+
+    def read(self, name: str) -> bytes | None: ...
+
+    def write(self, name: str, data: bytes) -> None: ...
+
+    def set_aside(self, name: str) -> None:
+        """Move a blob that can't be read out of the way, without destroying it."""
+        ...
+
+
+class MemoryStore:
+    """A store that lives as long as the process."""
+
+    def __init__(self) -> None:
+        self._blobs: dict[str, bytes] = {}
+
+    def read(self, name: str) -> bytes | None:
+        return self._blobs.get(name)
+
+    def write(self, name: str, data: bytes) -> None:
+        self._blobs[name] = data
+
+    def set_aside(self, name: str) -> None:
+        blob = self._blobs.pop(name, None)
+        if blob is not None:
+            self._blobs[f"{name}.damaged"] = blob
+
+
+class FolderStore:
+    """A store of files in one folder, made when first written to.
+
+    A write goes to a temporary file that then takes the old one's place, so that a process killed at any moment
+    leaves the old content or the new.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def read(self, name: str) -> bytes | None:
+        try:
+            return (self.folder / name).read_bytes()
+        except FileNotFoundError:
+            return None
+
+    def write(self, name: str, data: bytes) -> None:
+        self.folder.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(prefix=f".{name}.", dir=self.folder)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(data)
+            os.replace(temporary, self.folder / name)
+        except BaseException:
+            Path(temporary).unlink(missing_ok=True)
+            raise
+
+    def set_aside(self, name: str) -> None:
+        path = self.folder / name
+        if path.exists():
+            os.replace(path, path.with_name(f"{name}.damaged"))
