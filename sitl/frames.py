@@ -10,6 +10,7 @@ import math
 from sitl.jit import kernel
 from sitl.quaternion import Quat, Vec3, about_y, multiply
 
+GRAVITY_M_S2 = 9.80665  # standard gravity, along N's down axis
 HALF_SQRT2 = math.sqrt(0.5)
 BODY_TO_WIRE: Quat = (HALF_SQRT2, 0.0, -HALF_SQRT2, 0.0)  # q_y(-90 deg)
 WIRE_TO_BODY: Quat = (HALF_SQRT2, 0.0, HALF_SQRT2, 0.0)

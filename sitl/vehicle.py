@@ -21,11 +21,11 @@ from sitl.closed_loop import (
     start,
 )
 from sitl.control.gains import GAIN_NAMES, Settings, from_names
-from sitl.frames import standing
+from sitl.frames import GRAVITY_M_S2, standing
 from sitl.geodesy import GeoPoint
 from sitl.model.airframe import description as airframe_description
 from sitl.model.derivative import loads as plant_loads
-from sitl.model.rigid_body import GRAVITY_M_S2, State
+from sitl.model.rigid_body import State
 from sitl.model.wind import Wind
 from sitl.onboard.commander import Commander
 from sitl.onboard.declarations import declarations

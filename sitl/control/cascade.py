@@ -12,7 +12,8 @@ from sitl.control.pid import integrated, smoothed
 from sitl.control.position import velocity_command
 from sitl.control.rate import moment
 from sitl.control.reference import Reference, sample
-from sitl.control.velocity import GRAVITY_M_S2, specific_force
+from sitl.control.velocity import specific_force
+from sitl.frames import GRAVITY_M_S2
 from sitl.jit import kernel
 from sitl.model.airframe import Airframe
 from sitl.navigation import NavState

@@ -4,10 +4,9 @@ import math
 
 from sitl.control.gains import Loop
 from sitl.control.pid import pid
+from sitl.frames import GRAVITY_M_S2
 from sitl.jit import kernel
 from sitl.quaternion import Vec3
-
-GRAVITY_M_S2 = 9.80665
 
 
 @kernel

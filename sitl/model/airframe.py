@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sitl import strict_yaml
+from sitl.frames import GRAVITY_M_S2
 from sitl.strict_yaml import ConfigError
 
 
@@ -150,7 +151,7 @@ def gear(file: GearFile, airframe: Airframe) -> Gear:
     nose = [(file.nose_m.value, 0.0, 0.0)]
     tips = [(0.25 * airframe.chord_m, side * airframe.wing_span_m / 2, 0.0) for side in (-1, 1)]
     stiffness = file.stiffness_N_m.value
-    weight = airframe.mass_kg * 9.80665
+    weight = airframe.mass_kg * GRAVITY_M_S2
     return Gear(
         points_B=np.array(feet + nose + tips),
         stiffness_N_m=stiffness,

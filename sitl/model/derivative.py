@@ -2,12 +2,13 @@
 
 from typing import NamedTuple
 
+from sitl.frames import GRAVITY_M_S2
 from sitl.jit import kernel
 from sitl.model.aerodynamics import flap_loads, wing_loads
 from sitl.model.airframe import Airframe, Gear
 from sitl.model.ground import ground_loads
 from sitl.model.propulsion import rotor_speed, side_force, thrust, thrust_loads, wake_speed
-from sitl.model.rigid_body import GRAVITY_M_S2, State, accelerations
+from sitl.model.rigid_body import State, accelerations
 from sitl.quaternion import Vec3, rotate_back
 
 

@@ -2,11 +2,10 @@
 
 from typing import NamedTuple
 
+from sitl.frames import GRAVITY_M_S2
 from sitl.jit import kernel
 from sitl.model.airframe import Airframe
 from sitl.quaternion import Quat, Vec3, rotate
-
-GRAVITY_M_S2 = 9.80665  # standard gravity
 
 
 class State(NamedTuple):

@@ -5,10 +5,10 @@ import json
 import math
 from typing import Any, NamedTuple
 
+from sitl.frames import GRAVITY_M_S2
 from sitl.model.aerodynamics import flap_loads, wing_loads
 from sitl.model.airframe import Airframe
 from sitl.model.propulsion import wake_speed
-from sitl.model.rigid_body import GRAVITY_M_S2
 
 
 class TrimPoint(NamedTuple):

@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from sitl.frames import standing
+from sitl.frames import GRAVITY_M_S2, standing
 from sitl.model.aerodynamics import coefficients, panel, separated
 from sitl.model.derivative import ActuatorCommand, Actuators, derivative, loads, total
 from sitl.model.integrate import step
 from sitl.model.propulsion import rotor_speed, wake_speed
-from sitl.model.rigid_body import GRAVITY_M_S2, State
+from sitl.model.rigid_body import State
 from sitl.quaternion import rotate
 from sitl.vehicle_spec import load_vehicle
 

@@ -3,7 +3,7 @@ import math
 import pytest
 
 from sitl.control.feedforward import invert
-from sitl.model.rigid_body import GRAVITY_M_S2
+from sitl.frames import GRAVITY_M_S2
 from sitl.model.trim import solve, unbalanced
 from sitl.vehicle_spec import load_vehicle
 
