@@ -2,7 +2,9 @@
 
 from typing import Any
 
+from rich import box
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 # Tables "Position Tracking Errors at Key Waypoints and Overall Performance Metrics" of the paper, x, y, z; final errors by size.
@@ -31,29 +33,26 @@ ROWS = (
 )
 
 
+AXES = ("x", "y", "z")
+
+
 def show(result: dict[str, Any], paper: str | None, console: Console | None = None) -> None:
     """Print the result of a flight; `paper` names the published table to put beside it."""
     console = console or Console()
-    vehicle = result["vehicle"] or "unnamed vehicle"
-    table = Table(title=f"{result['mission']} · {vehicle} · {result['duration_s']:g} s", title_justify="left")
-    table.add_column("")
     published = PAPER[paper] if paper else None
-    for axis in ("x", "y", "z"):
+    title = f"{result['mission']} · {result['vehicle'] or 'unnamed vehicle'} · {result['duration_s']:g} s"
+    table = _table(f"{title} · paper, flown, ratio" if published else title)
+    table.add_column("")
+    for axis in AXES:
         if published:
-            table.add_column(f"{axis} paper", justify="right", style="dim")
-        table.add_column(f"{axis} flown", justify="right")
+            table.add_column(axis, justify="right", style="dim")
+        table.add_column("" if published else axis, justify="right")
         if published:
-            table.add_column("ratio", justify="right")
+            table.add_column("", justify="right")
     for key, label in ROWS:
-        cells = [label]
+        cells = [escape(label)]
         for k, value in enumerate(result[key]):
-            if published:
-                printed = published[key][k]
-                ratio = value / printed
-                mark = "green" if ratio <= 1.0 else "yellow"
-                cells += [f"{printed:.4f}", f"{value:.4f}", f"[{mark}]{ratio:.2f}[/]"]
-            else:
-                cells.append(f"{value:.4f}")
+            cells += _beside(value, published[key][k]) if published else [f"{value:.4f}"]
         table.add_row(*cells)
     console.print(table)
     if result["waypoints"]:
@@ -61,10 +60,19 @@ def show(result: dict[str, Any], paper: str | None, console: Console | None = No
     console.print(_ranges(result["ranges"]), f"{result['real_time_factor']:g} × real time", sep="\n", highlight=False)
 
 
+def _beside(flown: float, printed: float) -> list[str]:
+    ratio = flown / printed
+    return [f"{printed:.4f}", f"{flown:.4f}", f"[{'green' if ratio <= 1.0 else 'yellow'}]{ratio:.2f}×[/]"]
+
+
+def _table(title: str) -> Table:
+    return Table(title=escape(title), title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 0))
+
+
 def _waypoints(waypoints: list[dict[str, Any]]) -> Table:
-    table = Table(title="error at key times [m], measured − reference", title_justify="left")
-    for heading in ("t [s]", "target (north, east, down)", "x", "y", "z"):
-        table.add_column(heading, justify="right")
+    table = _table("error at key times [m], measured − reference")
+    for heading in ("t [s]", "target (north, east, down) [m]", *AXES):
+        table.add_column(escape(heading), justify="right")
     for w in waypoints:
         target = ", ".join(f"{v + 0.0:.2f}" for v in w["target"])
         table.add_row(f"{w['t_s']:.1f}", f"({target})", *(f"{e:+.4f}" for e in w["error"]))

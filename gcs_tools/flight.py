@@ -1,0 +1,313 @@
+"""Flying a plan over the link: everything a client does from the first heartbeat to the last disarming.
+
+A flight is a script of its Client (see client.py): no sockets, no clock of its own. Phases:
+
+    connecting → configuring → preparing → flying → landing → done
+
+Streamed flights send a target every 20 ms of the vehicle's time, each evaluated for the very instant it is stamped
+with. Uploaded flights hand the items over, start the mission and watch.
+"""
+
+import math
+from typing import Any
+
+from gcs_tools.client import Client, LinkFault, Script
+from gcs_tools.metrics import Metrics, Track, evaluate
+from gcs_tools.plan import Plan, Streamed, Uploaded
+from gcs_tools.recording import Recording
+from gcs_tools.reference import Vector
+from gcs_tools.upload import upload
+from sitl.mavlink import codec
+from sitl.mavlink.codec import mav
+
+STREAM_S = 0.02  # of the vehicle's time between targets
+LEAD_S = 0.5  # armed and standing, before the flight's time starts
+WARM_UP_S = 1.3  # of streaming before Offboard is asked for (the vehicle wants a second of it)
+ARMING_PATIENCE_S = 8.0
+START_WITHIN_M = 1.0  # of the flight's first point
+GROUND_M = 0.1  # a reference lower than this at its end is a landing
+LANDING_S = 120.0  # of the vehicle's time
+HOME_WITHIN_M = 10_000.0
+SETTLE_S = 5.0  # after a completed mission, for the vehicle to disarm by itself
+MISSION_COMPLETE = 5  # MISSION_STATE
+_MISSION_MODES = ("mission", "return", "land")
+
+_TARGET = codec.by_name("SET_POSITION_TARGET_LOCAL_NED")
+_IGNORE_YAW, _IGNORE_YAW_RATE = 1 << 10, 1 << 11
+
+# Interval of every stream that a flight looks at [µs]; all others that the vehicle sends by itself are turned off
+# while it lasts, so that a flight at many times real time isn't spent on packing them.
+_WANTED = {"LOCAL_POSITION_NED": 20_000, "DEBUG_VECT": 100_000, "SYS_STATUS": 500_000, "SYSTEM_TIME": 1_000_000}
+_WANTED_UPLOADED = {"POSITION_TARGET_LOCAL_NED": 20_000, "MISSION_CURRENT": 1_000_000, "HOME_POSITION": 2_000_000}
+_UNWANTED = (
+    "ATTITUDE ATTITUDE_QUATERNION HIGHRES_IMU GLOBAL_POSITION_INT POSITION_TARGET_LOCAL_NED POSITION_TARGET_GLOBAL_INT"
+    " ATTITUDE_TARGET SERVO_OUTPUT_RAW ACTUATOR_OUTPUT_STATUS VFR_HUD GPS_RAW_INT ALTITUDE WIND_COV EXTENDED_SYS_STATE"
+    " BATTERY_STATUS HOME_POSITION GPS_GLOBAL_ORIGIN SCALED_PRESSURE ESTIMATOR_STATUS VIBRATION MISSION_CURRENT"
+    " CURRENT_MODE"
+).split()
+
+
+class Flight:
+    """One flight of a plan by the vehicle at the other end of `client`.
+
+    `phase`, `t_s` and `progress` tell how far it is; `notes` what happened, to be taken out by whoever shows it.
+    """
+
+    def __init__(self, plan: Plan, client: Client) -> None:
+        self.plan, self.client = plan, client
+        self.phase = "connecting"
+        self.notes: list[str] = []
+        self.recording = Recording()
+        self.t0_s: float | None = None  # start of the flight on the vehicle's clock
+        self.measured_s: float | None = None  # how long it lasted, once it has been flown
+        self.wall_s: tuple[float, float] = (0.0, 0.0)  # the caller's time at its start and at its end
+        self.reached: list[tuple[float, Vector | None]] = []  # when items were reached, and where they are
+        self._wanted = _WANTED | (_WANTED_UPLOADED if isinstance(plan, Uploaded) else {})
+        self._next_target_s = 0.0
+        self._texts_shown = 0
+        client.on["LOCAL_POSITION_NED"] = self.recording.position
+        client.on["POSITION_TARGET_LOCAL_NED"] = self.recording.target
+        client.on["DEBUG_VECT"] = self.recording.debug
+        client.on["STATUSTEXT"] = self._told
+        client.start(self._script())
+
+    # What the outside sees.
+
+    @property
+    def t_s(self) -> float:
+        """Vehicle time since the start of the flight; negative before it."""
+        newest = self.client.vehicle.clock.newest_s
+        return newest - self.t0_s if newest is not None and self.t0_s is not None else -math.inf
+
+    @property
+    def progress(self) -> float:
+        """From 0 to 1."""
+        if self.measured_s is not None:
+            return 1.0
+        if isinstance(self.plan, Streamed):
+            return min(1.0, max(0.0, self.t_s / self.plan.duration_s))
+        done = self.client.vehicle.mission_item or 0
+        return min(1.0, done / len(self.plan.items)) if self.phase == "flying" else 0.0
+
+    def track(self) -> Track:
+        if self.t0_s is None:
+            raise LinkFault("the flight never started")
+        return self.recording.track(self.t0_s, self.plan.reference if isinstance(self.plan, Streamed) else None)
+
+    def metrics(self) -> Metrics:
+        if self.measured_s is None:
+            raise LinkFault("the flight wasn't flown to its end")
+        if isinstance(self.plan, Streamed):
+            reference = self.plan.reference
+            points: list[tuple[float, Vector | None]] = [(t, reference.at(t).position_m) for t in self.plan.key_times_s]
+        else:
+            points = self.reached
+        return evaluate(self.track(), self.measured_s, points)
+
+    def give_up(self) -> None:
+        """Interrupted from outside: the vehicle, if this flight put it into the air, lands where it is."""
+        if self.client.vehicle.armed and self.phase in ("flying", "landing"):
+            self._send_land()
+            self._note("asked the vehicle to land")
+        self.client.stop(LinkFault("interrupted"))
+
+    # The script.
+
+    def _script(self) -> Script[None]:
+        client, v = self.client, self.client.vehicle
+        yield from client.connect()
+        self._note(f"vehicle {client.system} heard")
+        self.phase = "configuring"
+        intervals = dict.fromkeys(_UNWANTED, -1) | self._wanted
+        yield from client.set_intervals(intervals)
+        yield from client.wait(
+            lambda: v.position_m is not None and v.clock.known and v.ready is not None,
+            10.0,
+            "the vehicle tells no position, time or readiness",
+        )
+        if v.armed:
+            raise LinkFault("the vehicle is armed already; a flight starts disarmed and standing")
+        self.phase = "preparing"
+        try:
+            if isinstance(self.plan, Streamed):
+                yield from self._streamed(self.plan)
+            else:
+                yield from self._uploaded(self.plan)
+        except LinkFault:
+            if v.armed and v.heard_s is not None and client.wall_s - v.heard_s < 2.0 and v.mode in ("offboard", "mission"):
+                self._send_land()  # it was this flight that put it into the air
+            raise
+        finally:
+            client.background = None
+            client.send_intervals(dict.fromkeys(intervals, 0))
+        self.phase = "done"
+
+    def _streamed(self, plan: Streamed) -> Script[None]:
+        client, v = self.client, self.client.vehicle
+        start = plan.reference.at(0.0).position_m
+        assert v.position_m is not None
+        away = math.dist(start, v.position_m)
+        if away > START_WITHIN_M:
+            place = ", ".join(f"{x:.2f}" for x in v.position_m)
+            raise LinkFault(f"the vehicle stands at ({place}), {away:.2f} m from where this flight starts")
+        client.background = self._stream
+        began_s = v.clock.at(client.wall_s)
+        yield from client.wait(
+            lambda: v.clock.at(client.wall_s) - began_s > WARM_UP_S, 60.0, "the vehicle's clock stands still"
+        )
+        yield from client.set_mode("offboard", patience_s=3.0)
+        yield from client.arm(ARMING_PATIENCE_S)
+        self._begin(LEAD_S)
+        yield from client.wait(lambda: self.t_s >= 0.0, 60.0, "the vehicle's clock stands still")
+        began_wall_s = client.wall_s
+        while self.t_s < plan.duration_s:
+            self._still("offboard")
+            yield math.inf
+        self.measured_s = plan.duration_s
+        self.wall_s = (began_wall_s, client.wall_s)
+        self.phase = "landing"
+        if plan.reference.at(plan.duration_s).position_m[2] > -GROUND_M:
+            yield from client.disarm(ARMING_PATIENCE_S)
+        else:
+            yield from self._land()
+        self._note("disarmed")
+
+    def _uploaded(self, plan: Uploaded) -> Script[None]:
+        client, v = self.client, self.client.vehicle
+        if plan.home is not None:
+            client.request("HOME_POSITION")
+            yield from client.wait(lambda: v.home is not None, 5.0, "the vehicle doesn't tell its home")
+            assert v.home is not None
+            away = _ground_distance_m(v.home, plan.home)
+            if away > HOME_WITHIN_M:
+                raise LinkFault(f"the plan's home is {away / 1000:.0f} km from the vehicle's: start the vehicle there")
+        yield from upload(client, plan.items)
+        self._note(f"{len(plan.items)} mission items uploaded")
+        client.on["MISSION_ITEM_REACHED"] = self._item_reached
+        yield from client.arm(ARMING_PATIENCE_S)
+        self._begin(0.0)
+        began_wall_s = client.wall_s
+        yield from client.require("starting the mission", mav.MAV_CMD_MISSION_START, 0.0, 0.0, patience_s=2.0)
+        yield from client.wait(lambda: v.mode == "mission", 3.0, "the mission was started but its mode isn't in force")
+        yield from self._follow(plan)
+        self.measured_s = max(self.t_s, STREAM_S)
+        self.wall_s = (began_wall_s, client.wall_s)
+        self.phase = "landing"
+        if v.armed:
+            yield from self._land()
+        self._note("disarmed")
+
+    def _follow(self, plan: Uploaded) -> Script[None]:
+        """Until the vehicle has disarmed, or the mission has long been complete."""
+        v = self.client.vehicle
+        complete_s: float | None = None
+        elsewhere_s: float | None = None
+        while v.armed:
+            t = self.t_s
+            if t > plan.limit_s:
+                raise LinkFault(f"the mission isn't done after {plan.limit_s:g} s, at item {v.mission_item}")
+            if v.mission_state == MISSION_COMPLETE:
+                complete_s = t if complete_s is None else complete_s
+                if t - complete_s > SETTLE_S and v.mode not in _MISSION_MODES[1:]:
+                    return
+            elif v.mode not in _MISSION_MODES:  # a completed mission may tell its mode before its state
+                elsewhere_s = t if elsewhere_s is None else elsewhere_s
+                if t - elsewhere_s > 2.0:
+                    raise LinkFault(self._left("mission"))
+            yield math.inf
+        yield from self.client.wait(lambda: v.mission_state == MISSION_COMPLETE, 2.0, self._left("mission"))
+
+    def _begin(self, lead_s: float) -> None:
+        now_s = self.client.vehicle.clock.at(self.client.wall_s) + lead_s
+        self.t0_s = math.ceil(now_s / STREAM_S - 1e-6) * STREAM_S
+        self.phase = "flying"
+        self._note("armed")
+
+    def _land(self) -> Script[None]:
+        client, v = self.client, self.client.vehicle
+        self._note("landing")
+        yield from client.require("landing", mav.MAV_CMD_NAV_LAND, 0.0, 0.0, 0.0, math.nan, math.nan, math.nan, math.nan)
+        client.background = None
+        began_s = self.t_s
+        while v.armed:
+            if self.t_s - began_s > LANDING_S:
+                raise LinkFault("the vehicle landed no sooner than it was given up on")
+            yield math.inf
+
+    def _send_land(self) -> None:
+        nan = math.nan
+        place = {"param4": nan, "param5": nan, "param6": nan, "param7": nan}
+        command = mav.MAV_CMD_NAV_LAND
+        self.client.send(codec.message("COMMAND_LONG", command=command, **place, **self.client.address()))
+
+    # What runs beside it.
+
+    def _stream(self) -> float:
+        """Send the target that is due; when the next one will be, on the caller's clock."""
+        client = self.client
+        clock = client.vehicle.clock
+        now_s = clock.at(client.wall_s)
+        if now_s < self._next_target_s - 1e-6:
+            return clock.when(self._next_target_s)
+        stamp_ms = round(now_s * 1000.0)
+        plan = self.plan
+        assert isinstance(plan, Streamed)
+        t = stamp_ms * 1e-3 - self.t0_s if self.t0_s is not None else -1.0
+        position, velocity, acceleration = plan.reference.at(t)
+        heading = plan.heading_rad
+        mask = _IGNORE_YAW_RATE if heading is not None else _IGNORE_YAW_RATE | _IGNORE_YAW
+        client.send_packed(
+            _TARGET,
+            _TARGET.pack(
+                stamp_ms,
+                *position,
+                *velocity,
+                *acceleration,
+                heading or 0.0,
+                0.0,
+                mask,
+                client.system or 0,
+                mav.MAV_COMP_ID_AUTOPILOT1,
+                mav.MAV_FRAME_LOCAL_NED,
+            ),
+        )
+        self._next_target_s += STREAM_S
+        if self._next_target_s < now_s:
+            self._next_target_s = now_s + STREAM_S
+        return clock.when(self._next_target_s)
+
+    def _item_reached(self, m: Any) -> None:
+        if self.t0_s is None or not isinstance(self.plan, Uploaded) or m.seq >= len(self.plan.items):
+            return
+        t = self.client.vehicle.clock.at(self.client.wall_s) - self.t0_s
+        self.reached.append((t, self.plan.items[m.seq].place_m()))
+        self._note(f"item {m.seq} reached")
+
+    def _still(self, mode: str) -> None:
+        v = self.client.vehicle
+        if not v.armed or v.mode != mode:
+            raise LinkFault(self._left(mode))
+
+    def _left(self, mode: str) -> str:
+        v = self.client.vehicle
+        became = "disarmed" if not v.armed else f"left {mode} mode for {v.mode}"
+        reason = v.reasons_since(self.client.wall_s - 3.0)
+        return f"the vehicle {became} at t = {self.t_s:.1f} s{': ' + reason if reason else ''}"
+
+    def _told(self, m: Any) -> None:
+        texts = self.client.vehicle.texts
+        if m.severity <= mav.MAV_SEVERITY_WARNING and texts:
+            self._note(f"vehicle says: {texts[-1].text}")
+
+    def _note(self, text: str) -> None:
+        t = self.t_s
+        self.notes.append(f"t = {t:.1f} s: {text}" if math.isfinite(t) else text)
+
+
+def _ground_distance_m(a: tuple[float, ...], b: tuple[float, ...]) -> float:
+    """Between two (latitude, longitude) in degrees, on a sphere; good for telling towns apart."""
+    lat_a, lon_a, lat_b, lon_b = (math.radians(x) for x in (*a[:2], *b[:2]))
+    haversine = (
+        math.sin((lat_b - lat_a) / 2) ** 2 + math.cos(lat_a) * math.cos(lat_b) * math.sin((lon_b - lon_a) / 2) ** 2
+    )
+    return 2 * 6_371_000.0 * math.asin(math.sqrt(min(1.0, haversine)))

@@ -1,0 +1,126 @@
+"""The tools' only file with sockets and clocks: it carries a Client's bytes over UDP and tells it the time.
+
+    udpin:HOST:PORT     listen there; answer whoever the vehicle turns out to be
+    udpout:HOST:PORT    send there first
+"""
+
+import math
+import select
+import socket
+import time
+from collections.abc import Callable
+from types import TracebackType
+from typing import NamedTuple
+
+from gcs_tools.client import Client, LinkFault
+
+Address = tuple[str, int]
+
+DEFAULT_CONNECTION = "udpin:127.0.0.1:14550"
+LONGEST_WAIT_S = 0.1
+_RECEIVE_BYTES = 65_535
+_BUFFER_BYTES = 1 << 20  # a burst of streams while a figure is being drawn
+
+
+def now_s() -> float:
+    """The wall clock that all of the tools' times are on [s]."""
+    return time.perf_counter()
+
+
+def sleep_until(wall_s: float) -> None:
+    left_s = wall_s - now_s()
+    if left_s > 0.0:
+        time.sleep(left_s)
+
+
+class Connection(NamedTuple):
+    """Where to listen, or whom to call."""
+
+    listens: bool
+    host: str
+    port: int
+
+
+def parse_connection(text: str) -> Connection:
+    """'udpin:HOST:PORT' or 'udpout:HOST:PORT'. Raises ValueError whose message names what is allowed."""
+    kind, _, rest = text.partition(":")
+    host, _, port = rest.rpartition(":")
+    if kind not in ("udpin", "udpout") or not host or not port.isdecimal() or not 1 <= int(port) <= 65535:
+        raise ValueError(f"'{text}' is not udpin:HOST:PORT or udpout:HOST:PORT (port 1 to 65535)")
+    return Connection(kind == "udpin", host, int(port))
+
+
+class UdpLink:
+    """One socket between a Client and its vehicle."""
+
+    def __init__(self, connection: Connection) -> None:
+        where = f"{connection.host}:{connection.port}"
+        self._peer: Address | None = None
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER_BYTES)
+            self._socket.setblocking(False)
+            if connection.listens:
+                self._socket.bind((connection.host, connection.port))
+            else:
+                self._peer = (socket.gethostbyname(connection.host), connection.port)
+        except OSError as error:
+            self._socket.close()
+            verb = "listen on" if connection.listens else "reach"
+            raise LinkFault(f"can't {verb} {where}: {error.strerror or error}") from None
+
+    def __enter__(self) -> "UdpLink":
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self._socket.close()
+
+    def turn(self, client: Client) -> None:
+        """Send what the client has, wait for an arrival or its next deadline, hand over what has arrived."""
+        self.flush(client)
+        wait_s = 0.0 if client.finished else min(LONGEST_WAIT_S, max(0.0, client.next_deadline - now_s()))
+        select.select([self._socket], [], [], wait_s)
+        while True:
+            try:
+                data, address = self._socket.recvfrom(_RECEIVE_BYTES)
+            except BlockingIOError:
+                return
+            except ConnectionError:
+                continue  # nobody listens there (yet)
+            if client.receive(data, now_s()):
+                self._peer = address
+
+    def flush(self, client: Client) -> None:
+        """Send what the client has to say now. What nobody has been heard for is dropped."""
+        for data in client.poll(now_s()):
+            if self._peer is not None:
+                try:
+                    self._socket.sendto(data, self._peer)
+                except (BlockingIOError, ConnectionError):
+                    continue
+                except OSError as error:
+                    raise LinkFault(f"can't send to {self._peer[0]}:{self._peer[1]}: {error.strerror or error}") from None
+
+    def run(self, client: Client, each_turn: Callable[[float], None] = lambda _wall_s: None) -> None:
+        """Until the client's script has ended, and what it sent last is on its way. Raises its fault."""
+        while not client.finished:
+            self.turn(client)
+            each_turn(now_s())
+        self.flush(client)
+        if client.fault is not None:
+            raise client.fault
+
+
+def free_udp_ports(*ports: int) -> bool:
+    """Whether all of these can be listened on at 127.0.0.1."""
+    for port in ports:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            try:
+                probe.bind(("127.0.0.1", port))
+            except OSError:
+                return False
+    return True
+
+
+def deadline(seconds: float) -> float:
+    return now_s() + seconds if math.isfinite(seconds) else math.inf

@@ -1,0 +1,107 @@
+"""`sitl fly`: vehicle and client in one process, taking turns, through the same MAVLink bytes as over UDP.
+
+The simulation waits for the client and the client for the simulation, and what both take for wall time is simulation
+time. So the same seed and settings give the same flight bit for bit, at whatever speed the machine manages.
+"""
+
+import argparse
+import math
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+from gcs_tools import plan as plans
+from gcs_tools import results
+from gcs_tools.client import Client
+from gcs_tools.flight import Flight
+from gcs_tools.link import now_s, sleep_until
+from gcs_tools.plan import Plan, Uploaded
+from gcs_tools.progress import Progress
+from sitl.geodesy import GeoPoint
+from sitl.mavlink.endpoint import Endpoint, PortKind
+from sitl.strict_yaml import ConfigError
+from sitl.vehicle import DEFAULT_HOME, Vehicle, load_vehicle
+
+TURN_US = 20_000
+ADDRESS = ("127.0.0.1", 14540)
+LIMIT_S = 7200.0  # of simulation time: no flight takes so long, so one that does is a mistake
+_SHOW_EVERY = 64  # turns
+
+
+class Flown(NamedTuple):
+    flight: Flight
+    vehicle: Vehicle
+    factor: float  # simulation time over wall time, from the first turn to the last
+
+
+def fly(plan: Plan, vehicle: Vehicle, *, speed: float = math.inf, quiet: bool = True) -> Flown:
+    """Fly a plan from its first message to its last. speed: of real time, at most.
+
+    The flight's own failure is in Flown.flight.client.fault.
+    """
+    endpoint, client = Endpoint(vehicle), Client()
+    flight = Flight(plan, client)
+    vehicle.advance(TURN_US)  # kernels compiled and caches warm before the clock starts
+    start_us, start_s = vehicle.now_us, now_s()
+    end_us = start_us + int(LIMIT_S * 1e6)
+    turns = 0
+    with Progress(flight, quiet=quiet) as progress:
+        while not client.finished and vehicle.now_us < end_us:
+            wall_s = vehicle.now_us * 1e-6
+            for datagram in client.poll(wall_s):
+                endpoint.receive(datagram, ADDRESS, PortKind.ONBOARD, wall_s)
+            for sent in endpoint.poll(wall_s):
+                client.receive(sent.data, wall_s)
+            vehicle.advance(vehicle.now_us + TURN_US)
+            turns += 1
+            if turns % _SHOW_EVERY == 0:
+                progress.update(now_s())
+            if speed != math.inf:
+                sleep_until(start_s + (vehicle.now_us - start_us) * 1e-6 / speed)
+    took_s = max(now_s() - start_s, 1e-9)
+    return Flown(flight, vehicle, (vehicle.now_us - start_us) * 1e-6 / took_s)
+
+
+def build(plan: Plan, args: argparse.Namespace) -> Vehicle:
+    """The vehicle that the command line asks for, standing where the plan was drawn. Raises ConfigError."""
+    home = DEFAULT_HOME
+    if isinstance(plan, Uploaded) and plan.home is not None:
+        home = GeoPoint(*plan.home)
+    return Vehicle(
+        load_vehicle(args.vehicle),
+        home=home,
+        seed=args.seed,
+        wind_N=args.wind,
+        gust_m_s=getattr(args, "gust", 0.0),
+        overrides=dict(getattr(args, "set", None) or ()),
+    )
+
+
+def main(args: argparse.Namespace) -> int:
+    """`sitl fly` with parsed arguments: mission, vehicle, speed (0: as fast as possible), seed, wind, gust, set, out, json.
+
+    0 when the mission was flown, 1 when it was not, 2 for settings that can't be used.
+    """
+    try:
+        plan = plans.load(args.mission)
+        vehicle = build(plan, args)
+    except ConfigError as error:
+        return _complain(str(error), 2)
+    flown = fly(plan, vehicle, speed=args.speed or math.inf, quiet=args.json)
+    flight = flown.flight
+    out = Path(args.out) if args.out else None
+    if flight.measured_s is not None:
+        try:
+            results.conclude(flight, vehicle=vehicle.spec.name, factor=flown.factor, out=out, as_json=args.json)
+        except OSError as error:
+            return _complain(f"{out}: can't be written: {error.strerror}", 2)
+    if not flight.client.finished:
+        return _complain(f"{plan.name}: not done after {LIMIT_S:g} s of simulation time", 1)
+    if flight.client.fault is not None:
+        return _complain(f"{plan.name}: {flight.client.fault}", 1)
+    return 0
+
+
+def _complain(message: str, code: int) -> int:
+    print(f"sitl fly: {message}", file=sys.stderr)
+    return code
