@@ -29,7 +29,7 @@ for _tag, _pattern, _first in (
     ("tag:yaml.org,2002:int", r"^[-+]?(?:0|[1-9][0-9]*)$", "-+0123456789"),
     (
         "tag:yaml.org,2002:float",
-        r"^[-+]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|\.inf|\.nan)$",
+        r"^[-+]?(?:(?:(?:0|[1-9][0-9]*)(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|\.inf|\.nan)$",
         "-+0123456789.",
     ),
     ("tag:yaml.org,2002:null", r"^(?:~|null|)$", ["~", "n", ""]),
@@ -78,7 +78,10 @@ def load(path: str | Path, into: type[T]) -> T:
 
 def loads(text: str, into: type[T], name: str = "<text>") -> T:
     """As `load`, from a string; `name` stands in for the file in messages."""
-    loader = _Loader(text)
+    try:
+        loader = _Loader(text)
+    except yaml.YAMLError as error:
+        raise ConfigError(f"{name}: {' '.join(str(error).split())}") from None
     try:
         node = loader.get_single_node()
         data = loader.construct_document(node) if node is not None else {}  # type: ignore[no-untyped-call]
