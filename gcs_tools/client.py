@@ -33,14 +33,14 @@ _REFUSALS = {
 }
 
 
-class LinkFault(Exception):
+class LinkError(Exception):
     """What was asked for didn't come about; the message says why in one line."""
 
 
 class Client:
     """Talks to the first vehicle it hears, or to the one with the system id `system`.
 
-    `wall_s` is the caller's time of the call in progress. The outcome of a script is in `finished`, `result` and `fault`.
+    `wall_s` is the caller's time of the call in progress. What a script came to is in `finished`, `result`, `fault`.
     `background`, if set, runs at every poll, sends what is due and returns when it wants to run again.
     """
 
@@ -51,7 +51,7 @@ class Client:
         self.background: Callable[[], float] | None = None
         self.finished = False
         self.result: Any = None
-        self.fault: LinkFault | None = None
+        self.fault: LinkError | None = None
         self._encoder = codec.Encoder(SYSTEM_ID, COMPONENT_ID)
         self._parser = codec.Parser()
         self._out: list[bytes] = []
@@ -75,7 +75,7 @@ class Client:
         self._script, self.finished, self.result, self.fault = script, False, None, None
         self._wake_s = -math.inf
 
-    def stop(self, fault: LinkFault) -> None:
+    def stop(self, fault: LinkError) -> None:
         """End the script where it stands; what it sends in leaving goes out with the next poll."""
         if self._script is not None:
             self._script.close()
@@ -140,15 +140,15 @@ class Client:
         heard_s = self.vehicle.heard_s
         try:
             if heard_s is not None and self.wall_s - heard_s > LOST_S:
-                self._wake_s = script.throw(LinkFault(f"nothing heard from the vehicle for {LOST_S:g} s"))
+                self._wake_s = script.throw(LinkError(f"nothing heard from the vehicle for {LOST_S:g} s"))
             else:
                 self._wake_s = next(script)
         except StopIteration as stop:
             self._end(stop.value, None)
-        except LinkFault as fault:
+        except LinkError as fault:
             self._end(None, fault)
 
-    def _end(self, result: Any, fault: LinkFault | None) -> None:
+    def _end(self, result: Any, fault: LinkError | None) -> None:
         self._script, self.background = None, None
         self.finished, self.result, self.fault = True, result, fault
 
@@ -171,11 +171,11 @@ class Client:
     # Pieces that scripts are made of.
 
     def wait(self, condition: Callable[[], bool], patience_s: float, complaint: str) -> Script[None]:
-        """Until the condition holds; a LinkFault with the complaint if it doesn't in time."""
+        """Until the condition holds; a LinkError with the complaint if it doesn't in time."""
         end_s = self.wall_s + patience_s
         while not condition():
             if self.wall_s >= end_s:
-                raise LinkFault(complaint)
+                raise LinkError(complaint)
             yield end_s
 
     def pause(self, seconds: float) -> Script[None]:
@@ -211,10 +211,10 @@ class Client:
                     return int(ack.result)
                 end_s = self.wall_s + 10.0 * RETRY_S
                 del self._acks[command]
-        raise LinkFault(f"the vehicle doesn't answer {command_name(command)}")
+        raise LinkError(f"the vehicle doesn't answer {command_name(command)}")
 
     def require(self, what: str, command: int, *params: float, patience_s: float = 0.0) -> Script[None]:
-        """Have a command accepted, trying again while refusals come and patience lasts; a LinkFault says why not."""
+        """Have a command accepted, trying again while refusals come and patience lasts; a LinkError says why not."""
         asked_s = self.wall_s
         while True:
             result = yield from self.ask(command, *params)
@@ -226,10 +226,10 @@ class Client:
                 self.refuse(what, result, asked_s)
 
     def refuse(self, what: str, result: int, asked_s: float) -> NoReturn:
-        """A LinkFault for a refusal, with the vehicle's own reason where it has told one."""
+        """A LinkError for a refusal, with the vehicle's own reason where it has told one."""
         reason = self.vehicle.reasons_since(asked_s)
         answer = _REFUSALS.get(result, f"answered with {result}")
-        raise LinkFault(f"{what}: {answer} by the vehicle{': ' + reason if reason else ''}")
+        raise LinkError(f"{what}: {answer} by the vehicle{': ' + reason if reason else ''}")
 
     def set_mode(self, mode: str, patience_s: float = 0.0) -> Script[None]:
         """Have a mode accepted and see it in force."""
@@ -259,7 +259,7 @@ class Client:
                 yield end_s
             if len(self.interval_acks) >= len(intervals_us):
                 return
-        raise LinkFault("the vehicle doesn't answer SET_MESSAGE_INTERVAL")
+        raise LinkError("the vehicle doesn't answer SET_MESSAGE_INTERVAL")
 
     def send_intervals(self, intervals_us: dict[str, int]) -> None:
         command = mav.MAV_CMD_SET_MESSAGE_INTERVAL

@@ -18,9 +18,9 @@ class _Anchor(NamedTuple):
 class VehicleClock:
     """Estimates the vehicle's time as a line through (stamp, arrival) pairs, in seconds.
 
-    A datagram is only ever late, never early. So the line runs through the least delayed pair in the second half of each
-    window of the caller's time, its slope is that between the last two of these, and a stamp ahead of the line lifts it
-    at once.
+    A datagram is only ever late, never early. So the line runs through the least delayed pair in the second half of
+    each window of the caller's time, its slope is that between the last two of these, and a stamp ahead of the line
+    lifts it at once.
     """
 
     def __init__(self) -> None:

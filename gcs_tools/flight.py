@@ -11,8 +11,8 @@ with. Uploaded flights hand the items over, start the mission and watch.
 import math
 from typing import Any
 
-from gcs_tools.client import Client, LinkFault, Script
-from gcs_tools.metrics import Metrics, Track, evaluate
+from gcs_tools.client import Client, LinkError, Script
+from gcs_tools.metrics import Metrics, TooFewSamplesError, Track, evaluate
 from gcs_tools.plan import Plan, Streamed, Uploaded
 from gcs_tools.recording import Recording
 from gcs_tools.reference import Vector
@@ -33,6 +33,7 @@ MISSION_COMPLETE = 5  # MISSION_STATE
 _MISSION_MODES = ("mission", "return", "land")
 
 _TARGET = codec.by_name("SET_POSITION_TARGET_LOCAL_NED")
+_HERE = (math.nan,) * 4  # heading, latitude, longitude and altitude of a landing: as they are
 _IGNORE_YAW, _IGNORE_YAW_RATE = 1 << 10, 1 << 11
 
 # Interval of every stream that a flight looks at [µs]; all others that the vehicle sends by itself are turned off
@@ -40,11 +41,29 @@ _IGNORE_YAW, _IGNORE_YAW_RATE = 1 << 10, 1 << 11
 _WANTED = {"LOCAL_POSITION_NED": 20_000, "DEBUG_VECT": 100_000, "SYS_STATUS": 500_000, "SYSTEM_TIME": 1_000_000}
 _WANTED_UPLOADED = {"POSITION_TARGET_LOCAL_NED": 20_000, "MISSION_CURRENT": 1_000_000, "HOME_POSITION": 2_000_000}
 _UNWANTED = (
-    "ATTITUDE ATTITUDE_QUATERNION HIGHRES_IMU GLOBAL_POSITION_INT POSITION_TARGET_LOCAL_NED POSITION_TARGET_GLOBAL_INT"
-    " ATTITUDE_TARGET SERVO_OUTPUT_RAW ACTUATOR_OUTPUT_STATUS VFR_HUD GPS_RAW_INT ALTITUDE WIND_COV EXTENDED_SYS_STATE"
-    " BATTERY_STATUS HOME_POSITION GPS_GLOBAL_ORIGIN SCALED_PRESSURE ESTIMATOR_STATUS VIBRATION MISSION_CURRENT"
-    " CURRENT_MODE"
-).split()
+    "ATTITUDE",
+    "ATTITUDE_QUATERNION",
+    "HIGHRES_IMU",
+    "GLOBAL_POSITION_INT",
+    "POSITION_TARGET_LOCAL_NED",
+    "POSITION_TARGET_GLOBAL_INT",
+    "ATTITUDE_TARGET",
+    "SERVO_OUTPUT_RAW",
+    "ACTUATOR_OUTPUT_STATUS",
+    "VFR_HUD",
+    "GPS_RAW_INT",
+    "ALTITUDE",
+    "WIND_COV",
+    "EXTENDED_SYS_STATE",
+    "BATTERY_STATUS",
+    "HOME_POSITION",
+    "GPS_GLOBAL_ORIGIN",
+    "SCALED_PRESSURE",
+    "ESTIMATOR_STATUS",
+    "VIBRATION",
+    "MISSION_CURRENT",
+    "CURRENT_MODE",
+)
 
 
 class Flight:
@@ -64,7 +83,7 @@ class Flight:
         self.reached: list[tuple[float, Vector | None]] = []  # when items were reached, and where they are
         self._wanted = _WANTED | (_WANTED_UPLOADED if isinstance(plan, Uploaded) else {})
         self._next_target_s = 0.0
-        self._texts_shown = 0
+        self._last_reached: int | None = None
         client.on["LOCAL_POSITION_NED"] = self.recording.position
         client.on["POSITION_TARGET_LOCAL_NED"] = self.recording.target
         client.on["DEBUG_VECT"] = self.recording.debug
@@ -91,25 +110,28 @@ class Flight:
 
     def track(self) -> Track:
         if self.t0_s is None:
-            raise LinkFault("the flight never started")
+            raise LinkError("the flight never started")
         return self.recording.track(self.t0_s, self.plan.reference if isinstance(self.plan, Streamed) else None)
 
     def metrics(self) -> Metrics:
         if self.measured_s is None:
-            raise LinkFault("the flight wasn't flown to its end")
+            raise LinkError("the flight wasn't flown to its end")
         if isinstance(self.plan, Streamed):
             reference = self.plan.reference
             points: list[tuple[float, Vector | None]] = [(t, reference.at(t).position_m) for t in self.plan.key_times_s]
         else:
             points = self.reached
-        return evaluate(self.track(), self.measured_s, points)
+        try:
+            return evaluate(self.track(), self.measured_s, points)
+        except TooFewSamplesError as error:
+            raise LinkError(str(error)) from None
 
     def give_up(self) -> None:
         """Interrupted from outside: the vehicle, if this flight put it into the air, lands where it is."""
         if self.client.vehicle.armed and self.phase in ("flying", "landing"):
             self._send_land()
             self._note("asked the vehicle to land")
-        self.client.stop(LinkFault("interrupted"))
+        self.client.stop(LinkError("interrupted"))
 
     # The script.
 
@@ -126,15 +148,15 @@ class Flight:
             "the vehicle tells no position, time or readiness",
         )
         if v.armed:
-            raise LinkFault("the vehicle is armed already; a flight starts disarmed and standing")
+            raise LinkError("the vehicle is armed already; a flight starts disarmed and standing")
         self.phase = "preparing"
         try:
             if isinstance(self.plan, Streamed):
                 yield from self._streamed(self.plan)
             else:
                 yield from self._uploaded(self.plan)
-        except LinkFault:
-            if v.armed and v.heard_s is not None and client.wall_s - v.heard_s < 2.0 and v.mode in ("offboard", "mission"):
+        except LinkError:
+            if v.armed and self.phase == "flying" and v.mode in ("offboard", "mission"):
                 self._send_land()  # it was this flight that put it into the air
             raise
         finally:
@@ -149,7 +171,7 @@ class Flight:
         away = math.dist(start, v.position_m)
         if away > START_WITHIN_M:
             place = ", ".join(f"{x:.2f}" for x in v.position_m)
-            raise LinkFault(f"the vehicle stands at ({place}), {away:.2f} m from where this flight starts")
+            raise LinkError(f"the vehicle stands at ({place}), {away:.2f} m from where this flight starts")
         client.background = self._stream
         began_s = v.clock.at(client.wall_s)
         yield from client.wait(
@@ -180,7 +202,7 @@ class Flight:
             assert v.home is not None
             away = _ground_distance_m(v.home, plan.home)
             if away > HOME_WITHIN_M:
-                raise LinkFault(f"the plan's home is {away / 1000:.0f} km from the vehicle's: start the vehicle there")
+                raise LinkError(f"the plan's home is {away / 1000:.0f} km from the vehicle's: start the vehicle there")
         yield from upload(client, plan.items)
         self._note(f"{len(plan.items)} mission items uploaded")
         client.on["MISSION_ITEM_REACHED"] = self._item_reached
@@ -205,7 +227,7 @@ class Flight:
         while v.armed:
             t = self.t_s
             if t > plan.limit_s:
-                raise LinkFault(f"the mission isn't done after {plan.limit_s:g} s, at item {v.mission_item}")
+                raise LinkError(f"the mission isn't done after {plan.limit_s:g} s, at item {v.mission_item}")
             if v.mission_state == MISSION_COMPLETE:
                 complete_s = t if complete_s is None else complete_s
                 if t - complete_s > SETTLE_S and v.mode not in _MISSION_MODES[1:]:
@@ -213,7 +235,7 @@ class Flight:
             elif v.mode not in _MISSION_MODES:  # a completed mission may tell its mode before its state
                 elsewhere_s = t if elsewhere_s is None else elsewhere_s
                 if t - elsewhere_s > 2.0:
-                    raise LinkFault(self._left("mission"))
+                    raise LinkError(self._left("mission"))
             yield math.inf
         yield from self.client.wait(lambda: v.mission_state == MISSION_COMPLETE, 2.0, self._left("mission"))
 
@@ -226,17 +248,16 @@ class Flight:
     def _land(self) -> Script[None]:
         client, v = self.client, self.client.vehicle
         self._note("landing")
-        yield from client.require("landing", mav.MAV_CMD_NAV_LAND, 0.0, 0.0, 0.0, math.nan, math.nan, math.nan, math.nan)
+        yield from client.require("landing", mav.MAV_CMD_NAV_LAND, 0.0, 0.0, 0.0, *_HERE)
         client.background = None
         began_s = self.t_s
         while v.armed:
             if self.t_s - began_s > LANDING_S:
-                raise LinkFault("the vehicle landed no sooner than it was given up on")
+                raise LinkError("the vehicle landed no sooner than it was given up on")
             yield math.inf
 
     def _send_land(self) -> None:
-        nan = math.nan
-        place = {"param4": nan, "param5": nan, "param6": nan, "param7": nan}
+        place = {f"param{k}": value for k, value in enumerate(_HERE, start=4)}
         command = mav.MAV_CMD_NAV_LAND
         self.client.send(codec.message("COMMAND_LONG", command=command, **place, **self.client.address()))
 
@@ -279,6 +300,9 @@ class Flight:
     def _item_reached(self, m: Any) -> None:
         if self.t0_s is None or not isinstance(self.plan, Uploaded) or m.seq >= len(self.plan.items):
             return
+        if self._last_reached == m.seq:
+            return  # told twice
+        self._last_reached = m.seq
         t = self.client.vehicle.clock.at(self.client.wall_s) - self.t0_s
         self.reached.append((t, self.plan.items[m.seq].place_m()))
         self._note(f"item {m.seq} reached")
@@ -286,7 +310,7 @@ class Flight:
     def _still(self, mode: str) -> None:
         v = self.client.vehicle
         if not v.armed or v.mode != mode:
-            raise LinkFault(self._left(mode))
+            raise LinkError(self._left(mode))
 
     def _left(self, mode: str) -> str:
         v = self.client.vehicle

@@ -1,10 +1,9 @@
 """The tools' only file with sockets and clocks: it carries a Client's bytes over UDP and tells it the time.
 
-    udpin:HOST:PORT     listen there; answer whoever the vehicle turns out to be
-    udpout:HOST:PORT    send there first
+udpin:HOST:PORT     listen there; answer whoever the vehicle turns out to be
+udpout:HOST:PORT    send there first
 """
 
-import math
 import select
 import socket
 import time
@@ -12,11 +11,10 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import NamedTuple
 
-from gcs_tools.client import Client, LinkFault
+from gcs_tools.client import Client, LinkError
 
 Address = tuple[str, int]
 
-DEFAULT_CONNECTION = "udpin:127.0.0.1:14550"
 LONGEST_WAIT_S = 0.1
 _RECEIVE_BYTES = 65_535
 _BUFFER_BYTES = 1 << 20  # a burst of streams while a figure is being drawn
@@ -67,7 +65,7 @@ class UdpLink:
         except OSError as error:
             self._socket.close()
             verb = "listen on" if connection.listens else "reach"
-            raise LinkFault(f"can't {verb} {where}: {error.strerror or error}") from None
+            raise LinkError(f"can't {verb} {where}: {error.strerror or error}") from None
 
     def __enter__(self) -> "UdpLink":
         return self
@@ -99,7 +97,8 @@ class UdpLink:
                 except (BlockingIOError, ConnectionError):
                     continue
                 except OSError as error:
-                    raise LinkFault(f"can't send to {self._peer[0]}:{self._peer[1]}: {error.strerror or error}") from None
+                    where = f"{self._peer[0]}:{self._peer[1]}"
+                    raise LinkError(f"can't send to {where}: {error.strerror or error}") from None
 
     def run(self, client: Client, each_turn: Callable[[float], None] = lambda _wall_s: None) -> None:
         """Until the client's script has ended, and what it sent last is on its way. Raises its fault."""
@@ -120,7 +119,3 @@ def free_udp_ports(*ports: int) -> bool:
             except OSError:
                 return False
     return True
-
-
-def deadline(seconds: float) -> float:
-    return now_s() + seconds if math.isfinite(seconds) else math.inf

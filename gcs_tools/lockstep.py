@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from gcs_tools import plan as plans
 from gcs_tools import results
-from gcs_tools.client import Client
+from gcs_tools.client import Client, LinkError
 from gcs_tools.flight import Flight
 from gcs_tools.link import now_s, sleep_until
 from gcs_tools.plan import Plan, Uploaded
@@ -78,7 +78,7 @@ def build(plan: Plan, args: argparse.Namespace) -> Vehicle:
 
 
 def main(args: argparse.Namespace) -> int:
-    """`sitl fly` with parsed arguments: mission, vehicle, speed (0: as fast as possible), seed, wind, gust, set, out, json.
+    """`sitl fly` with its parsed arguments; a speed of 0 is as fast as possible.
 
     0 when the mission was flown, 1 when it was not, 2 for settings that can't be used.
     """
@@ -93,6 +93,8 @@ def main(args: argparse.Namespace) -> int:
     if flight.measured_s is not None:
         try:
             results.conclude(flight, vehicle=vehicle.spec.name, factor=flown.factor, out=out, as_json=args.json)
+        except LinkError as error:
+            return _complain(f"{plan.name}: {error}", 1)
         except OSError as error:
             return _complain(f"{out}: can't be written: {error.strerror}", 2)
     if not flight.client.finished:

@@ -49,7 +49,7 @@ class Metrics(NamedTuple):
     largest_gap_s: float  # between two samples: how much of the flight went unseen
 
 
-class TooFewSamples(ValueError):
+class TooFewSamplesError(ValueError):
     pass
 
 
@@ -79,14 +79,15 @@ def evaluate(track: Track, duration_s: float, key_points: Sequence[tuple[float, 
 
 def _integral(values: Array, t: Array) -> Array:
     """∫ values dt by the trapezoid rule, per column."""
-    return np.sum(0.5 * (values[1:] + values[:-1]) * np.diff(t)[:, np.newaxis], axis=0)
+    total: Array = np.sum(0.5 * (values[1:] + values[:-1]) * np.diff(t)[:, np.newaxis], axis=0)
+    return total
 
 
 def _window(t: Array, values: Array, duration_s: float) -> tuple[Array, Array]:
     """The samples in 0..duration_s, with both ends filled in: interpolated, or held where the record stops short."""
     inside = (t > 0.0) & (t < duration_s)
     if t.size < 2 or np.count_nonzero(inside) < 2:
-        raise TooFewSamples("too few position samples came from the vehicle to measure the flight")
+        raise TooFewSamplesError("too few position samples came from the vehicle to measure the flight")
     ends = [_interpolate(at, t, values) for at in (0.0, duration_s)]
     return (
         np.concatenate(([0.0], t[inside], [duration_s])),

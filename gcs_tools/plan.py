@@ -60,7 +60,7 @@ class Streamed(NamedTuple):
 
 
 class Uploaded(NamedTuple):
-    """A flight of mission items. The metrics run from its start to the vehicle's disarming or the end of the mission."""
+    """A flight of mission items. The metrics run from its start to the disarming or the end of the mission."""
 
     name: str
     source: str

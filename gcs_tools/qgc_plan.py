@@ -1,7 +1,7 @@
-"""QGroundControl's .plan files (JSON) → a Plan. Simple items are flown; what the vehicle can't do is named, not skipped.
+"""QGroundControl's .plan files (JSON) → a Plan. Simple items are flown; what can't be flown is named, not skipped.
 
-Format: QGroundControl developer guide, "Plan file format": fileType "Plan" version 1, mission version 2, SimpleItem with
-seven params of which 5..7 are latitude, longitude and altitude in the item's own frame.
+Format: QGroundControl developer guide, "Plan file format": fileType "Plan" version 1, mission version 2, SimpleItem
+with seven params of which 5..7 are latitude, longitude and altitude in the item's own frame.
 """
 
 import json
@@ -117,7 +117,8 @@ def _item(source: _Source, raw: dict[str, Any], at: str) -> Item:
     elif item.frame == FRAME_MISSION:
         frame, scale = item.frame, 1.0
     else:
-        source.fault(f"{at}.frame", f"{item.frame} is not a frame of mission items; allowed: 0, 1, 2, 3, 5, 6, 7, 10, 11")
+        known = ", ".join(map(str, sorted((*GLOBAL_FRAMES, *LOCAL_FRAMES, FRAME_MISSION))))
+        source.fault(f"{at}.frame", f"{item.frame} is not a frame of mission items; allowed: {known}")
     x, y = (0 if math.isnan(p) else round(p * scale) for p in (p5, p6))
     if not all(-(2**31) <= value < 2**31 for value in (x, y)):
         source.fault(f"{at}.params", "a coordinate is too large for the link")

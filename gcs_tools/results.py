@@ -14,9 +14,23 @@ from gcs_tools.metrics import Track, report
 
 GAP_S = 0.5  # of the vehicle's time without a position sample, above which the figures deserve a warning
 COLUMNS = (
-    "t_s,ref_north_m,ref_east_m,ref_down_m,north_m,east_m,down_m,err_north_m,err_east_m,err_down_m,"
-    "roll_deg,pitch_deg,yaw_deg,thrust_N,flap_left_deg,flap_right_deg"
-).split(",")
+    "t_s",
+    "ref_north_m",
+    "ref_east_m",
+    "ref_down_m",
+    "north_m",
+    "east_m",
+    "down_m",
+    "err_north_m",
+    "err_east_m",
+    "err_down_m",
+    "roll_deg",
+    "pitch_deg",
+    "yaw_deg",
+    "thrust_N",
+    "flap_left_deg",
+    "flap_right_deg",
+)
 
 
 def conclude(flight: Flight, *, vehicle: str | None, factor: float, out: Path | None, as_json: bool) -> None:

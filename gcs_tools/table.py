@@ -7,7 +7,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-# Tables "Position Tracking Errors at Key Waypoints and Overall Performance Metrics" of the paper, x, y, z; final errors by size.
+# The paper's two tables "Position Tracking Errors at Key Waypoints and Overall Performance Metrics": x, y, z, final
+# errors without their sign.
 PAPER = {
     "rectangle": {
         "mae": (0.0317, 0.0135, 0.0099),
@@ -74,7 +75,7 @@ def _waypoints(waypoints: list[dict[str, Any]]) -> Table:
     for heading in ("t [s]", "target (north, east, down) [m]", *AXES):
         table.add_column(escape(heading), justify="right")
     for w in waypoints:
-        target = ", ".join(f"{v + 0.0:.2f}" for v in w["target"])
+        target = ", ".join(f"{round(v, 2) + 0.0:.2f}" for v in w["target"])
         table.add_row(f"{w['t_s']:.1f}", f"({target})", *(f"{e:+.4f}" for e in w["error"]))
     return table
 

@@ -1,7 +1,8 @@
-"""The project's own mission files (docs/missions.md): YAML → a Plan, with every mistake named by file, line and field."""
+"""The project's own mission files (docs/missions.md): YAML → a Plan; mistakes are named by file, line and field."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from itertools import pairwise
 from typing import Annotated, Any, NoReturn, TypeVar
 
 import msgspec
@@ -112,7 +113,7 @@ def _bare(command: int, p1: float = 0.0, p2: float = 0.0, p3: float = 0.0) -> It
     return Item(FRAME_MISSION, command, p1, p2, p3, 0.0, 0, 0, 0.0)
 
 
-ITEMS = {
+ITEMS: dict[str, tuple[Any, Callable[[Any], Item]]] = {
     "takeoff": (_Takeoff, lambda i: _placed(22, i.at_m, i.heading_deg)),
     "waypoint": (_Waypoint, lambda i: _placed(16, i.at_m, i.heading_deg, i.hold_s, i.acceptance_m)),
     "land": (_Land, lambda i: _placed(21, i.at_m, i.heading_deg)),
@@ -123,7 +124,7 @@ ITEMS = {
 DIRECTIONS = {"clockwise": 1, "anticlockwise": -1}
 PAPER_TABLES = ("rectangle", "circle")
 
-T = TypeVar("T")
+T = TypeVar("T", bound=msgspec.Struct)
 
 
 class _File:
@@ -167,14 +168,15 @@ def loads(text: str, name: str) -> Plan:
     if data.get("paper") is not None:
         file.choice("paper", data["paper"], PAPER_TABLES)
     build, struct = KINDS[data["kind"]]
-    return build(file, file.convert(data, struct))
+    plan: Plan = build(file, file.convert(data, struct))
+    return plan
 
 
 def _waypoints(file: _File, m: _Waypoints) -> Plan:
     points = [TimedPoint(p.t_s, p.at_m) for p in m.waypoints]
     if points[0].t_s != 0.0 or points[0].at_m[2] != 0.0:
         file.fault("waypoints[0]", "a flight starts on the ground: the first waypoint has t_s 0 and a down of 0")
-    for i, (a, b) in enumerate(zip(points, points[1:], strict=False), start=1):
+    for i, (a, b) in enumerate(pairwise(points), start=1):
         span = b.t_s - a.t_s
         if span <= 0.0:
             file.fault(f"waypoints[{i}].t_s", f"{b.t_s:g} s doesn't come after the waypoint before it ({a.t_s:g} s)")

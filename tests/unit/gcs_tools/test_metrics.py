@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gcs_tools.metrics import TooFewSamples, Track, evaluate, report
+from gcs_tools.metrics import TooFewSamplesError, Track, evaluate, report
 
 NONE = np.zeros((0, 4))
 
@@ -91,7 +91,7 @@ def test_a_series_never_heard_has_no_range() -> None:
 
 
 def test_a_flight_without_samples_is_said_to_be_unmeasurable() -> None:
-    with pytest.raises(TooFewSamples, match="too few position samples"):
+    with pytest.raises(TooFewSamplesError, match="too few position samples"):
         evaluate(track(np.array([-1.0, 20.0]), np.zeros((2, 3))), 10.0)
 
 

@@ -173,7 +173,10 @@ def qgc(**changes: Any) -> dict[str, Any]:
             "cruiseSpeed": 15,
             "hoverSpeed": 5,
             "plannedHomePosition": [47.397742, 8.545594, 488],
-            "items": [qgc_item(22, [0, 0, 0, None, 47.397742, 8.545594, 5]), qgc_item(16, [0, 0, 0, None, 47.4, 8.5, 5])],
+            "items": [
+                qgc_item(22, [0, 0, 0, None, 47.397742, 8.545594, 5]),
+                qgc_item(16, [0, 0, 0, None, 47.4, 8.5, 5]),
+            ],
         },
         **changes,
     }

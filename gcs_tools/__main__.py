@@ -1,0 +1,168 @@
+"""The `gcs` command line: fly missions, read and write parameters, command and watch a vehicle over MAVLink."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NoReturn
+
+DESCRIPTION = """\
+A small ground station: talks MAVLink over UDP to a running vehicle (start one with `sitl run`).
+
+connections (--connect):
+  udpin:127.0.0.1:14550     listen where the vehicle sends to ground stations (the default)
+  udpin:127.0.0.1:14540     listen where instance 0 sends to onboard computers
+  udpout:127.0.0.1:18570    call instance 0's ground-station port; leaves 14550 to another program
+"""
+
+EXAMPLES = """\
+examples:
+  gcs watch
+  gcs fly missions/rectangle.yaml
+  gcs takeoff --height 3 --wait && gcs land --wait
+  gcs param set RATE_Y_P 0.4
+  gcs COMMAND --help explains each
+
+exit status: 0 done, 1 the vehicle refused or was lost, 2 the request itself can't be used, 130 interrupted.
+"""
+
+MODES = ("position", "takeoff", "hold", "mission", "return", "land", "offboard")
+
+
+class _Parser(argparse.ArgumentParser):
+    """Answers a mistake with one line."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
+def _connection(text: str) -> Any:
+    from gcs_tools.link import parse_connection
+
+    try:
+        return parse_connection(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _number(text: str) -> float:
+    import math
+
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a finite number")
+    return value
+
+
+def _positive(text: str) -> float:
+    value = _number(text)
+    if value <= 0.0:
+        raise argparse.ArgumentTypeError(f"'{text}' must be above 0")
+    return value
+
+
+def _system(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text) <= 255:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a system id (1 to 255)")
+    return int(text)
+
+
+def parser() -> argparse.ArgumentParser:
+    link = argparse.ArgumentParser(add_help=False)
+    link.add_argument(
+        "--connect",
+        type=_connection,
+        default="udpin:127.0.0.1:14550",
+        metavar="udpin|udpout:HOST:PORT",
+        help="where the vehicle is (udpin:127.0.0.1:14550)",
+    )
+    link.add_argument("--system", type=_system, metavar="ID", help="talk to this system id (the first one heard)")
+
+    top = _Parser(prog="gcs", description=DESCRIPTION, epilog=EXAMPLES, formatter_class=_Raw, allow_abbrev=False)
+    commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_Parser)
+
+    def add(group: Any, name: str, short: str, examples: str = "") -> argparse.ArgumentParser:
+        epilog = f"examples:\n{examples}" if examples else None
+        made: argparse.ArgumentParser = group.add_parser(
+            name, help=short, description=short, epilog=epilog, parents=[link], formatter_class=_Raw, allow_abbrev=False
+        )
+        return made
+
+    fly = add(
+        commands,
+        "fly",
+        "fly a mission and print its error table",
+        "  gcs fly missions/rectangle.yaml\n"
+        "  gcs fly missions/circle.yaml --connect udpin:127.0.0.1:14540 --json\n"
+        "  gcs fly field.plan --out out/field",
+    )
+    fly.add_argument("mission", type=Path, metavar="MISSION", help="a mission (.yaml) or QGroundControl plan (.plan)")
+    fly.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
+    fly.add_argument("--out", type=Path, metavar="DIR", help="write result.json and track.csv here")
+
+    param = commands.add_parser("param", help="list, read, write, save and load parameters", formatter_class=_Raw)
+    actions = param.add_subparsers(dest="action", required=True, metavar="ACTION", parser_class=_Parser)
+    listing = add(actions, "list", "list parameters", "  gcs param list\n  gcs param list RATE_ --json")
+    listing.add_argument("prefix", nargs="?", default="", metavar="PREFIX", help="only names that start so")
+    listing.add_argument("--json", action="store_true", help="print one JSON object")
+    get = add(actions, "get", "print one parameter", "  gcs param get RATE_Y_P")
+    get.add_argument("name", metavar="NAME")
+    put = add(actions, "set", "write one parameter", "  gcs param set RATE_Y_P 0.4\n  gcs param set SIM_SPEED 5")
+    put.add_argument("name", metavar="NAME")
+    put.add_argument("value", type=_number, metavar="VALUE")
+    for name, short in (("save", "write all parameters to a YAML file"), ("load", "write a file's values that differ")):
+        add(actions, name, short, f"  gcs param {name} tuned.yaml").add_argument("file", type=Path, metavar="FILE")
+
+    for name, short in (("arm", "arm the motors"), ("disarm", "disarm the motors")):
+        force = add(commands, name, short, f"  gcs {name}")
+        force.add_argument("--force", action="store_true", help="even if checks or the air stand against it")
+    takeoff = add(commands, "takeoff", "arm if need be, climb and hover", "  gcs takeoff --height 3 --wait")
+    takeoff.add_argument("--height", type=_positive, metavar="M", help="above home (the vehicle's MIS_TAKEOFF_ALT)")
+    for name, short in (("land", "land where it is"), ("return", "return home and land")):
+        add(commands, name, short, f"  gcs {name} --wait").add_argument("--wait", action="store_true", help=_WAIT_DOWN)
+    takeoff.add_argument("--wait", action="store_true", help="until it hovers")
+    add(commands, "hold", "stop and hover here", "  gcs hold")
+    mode = add(commands, "mode", "switch to a mode", "  gcs mode mission")
+    mode.add_argument("mode", choices=MODES)
+    watch = add(commands, "watch", "show the vehicle's state live, until Ctrl-C", "  gcs watch\n  gcs watch --for 10")
+    watch.add_argument("--for", dest="seconds", type=_positive, metavar="S", help="stop after so long")
+    return top
+
+
+_WAIT_DOWN = "until it stands disarmed"
+_Raw = argparse.RawDescriptionHelpFormatter
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    args = parser().parse_args(argv)
+    from gcs_tools import tasks
+    from gcs_tools.client import LinkError
+    from sitl.strict_yaml import ConfigError
+
+    name = f"gcs {args.command}"
+    try:
+        tasks.run(args)
+    except ConfigError as error:
+        return _complain(name, error, 2)
+    except LinkError as error:
+        return _complain(name, error, 1)
+    except BrokenPipeError:
+        sys.stderr.close()  # whoever read our output has gone
+        return 1
+    except OSError as error:
+        return _complain(name, f"{error.filename}: {error.strerror}" if error.filename else error, 2)
+    except KeyboardInterrupt:
+        return 130
+    return 0
+
+
+def _complain(name: str, error: object, code: int) -> int:
+    print(f"{name}: {error}", file=sys.stderr)
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,41 @@
+"""`gcs fly`: a plan flown over UDP by a vehicle that runs somewhere else."""
+
+import sys
+from pathlib import Path
+
+from gcs_tools import results
+from gcs_tools.client import Client, LinkError
+from gcs_tools.flight import Flight
+from gcs_tools.link import Connection, UdpLink
+from gcs_tools.plan import Plan
+from gcs_tools.progress import Progress
+
+
+def fly(
+    plan: Plan, connection: Connection, *, system: int | None = None, out: Path | None = None, as_json: bool = False
+) -> None:
+    """Fly, measure and tell the result.
+
+    Raises LinkError when it wasn't flown to its end, OSError when `out` can't be written. A flight that ran its whole
+    time is measured and told even if the landing behind it went wrong.
+    """
+    client = Client(system)
+    flight = Flight(plan, client)
+    fault: LinkError | None = None
+    with UdpLink(connection) as link:
+        try:
+            with Progress(flight, quiet=as_json) as progress:
+                link.run(client, progress.update)
+        except LinkError as error:
+            fault = error
+        except KeyboardInterrupt:
+            flight.give_up()
+            link.flush(client)
+            print("\n".join(("", *flight.notes)) if flight.notes else "", file=sys.stderr)
+            raise
+    if flight.measured_s is not None:
+        began_s, ended_s = flight.wall_s
+        factor = flight.measured_s / max(ended_s - began_s, 1e-9)
+        results.conclude(flight, vehicle=client.vehicle.name, factor=factor, out=out, as_json=as_json)
+    if fault is not None:
+        raise LinkError(f"{plan.name}: {fault}")

@@ -1,0 +1,115 @@
+"""What each `gcs` command does: a script of a Client, run over UDP, and its result printed."""
+
+import argparse
+import json
+import math
+from collections.abc import Callable
+from typing import Any
+
+from gcs_tools import commands, params
+from gcs_tools.client import Client, Script
+from gcs_tools.link import UdpLink
+
+
+def run(args: argparse.Namespace) -> None:
+    """Raises ConfigError, LinkError, OSError, KeyboardInterrupt."""
+    _TASKS[args.command](args)
+
+
+def _converse(args: argparse.Namespace, talk: Callable[[Client], Script[Any]]) -> Any:
+    client = Client(args.system)
+    with UdpLink(args.connect) as link:
+        client.start(talk(client))
+        link.run(client)
+    return client.result
+
+
+def _fly(args: argparse.Namespace) -> None:
+    from gcs_tools import plan
+    from gcs_tools.fly import fly
+
+    fly(plan.load(args.mission), args.connect, system=args.system, out=args.out, as_json=args.json)
+
+
+def _param(args: argparse.Namespace) -> None:
+    _PARAM_TASKS[args.action](args)
+
+
+def _after_connecting(talk: Callable[[Client], Script[Any]]) -> Callable[[Client], Script[Any]]:
+    def script(client: Client) -> Script[Any]:
+        yield from client.connect()
+        return (yield from talk(client))
+
+    return script
+
+
+def _param_list(args: argparse.Namespace) -> None:
+    found = _converse(args, _after_connecting(params.fetch_all))
+    chosen = {name: p for name, p in found.items() if name.startswith(args.prefix.upper())}
+    if args.json:
+        print(json.dumps({name: p.value for name, p in chosen.items()}))
+        return
+    for name, p in chosen.items():
+        print(f"{name:<16}  {p.text}")
+
+
+def _param_get(args: argparse.Namespace) -> None:
+    print(_converse(args, _after_connecting(lambda c: params.fetch(c, args.name.upper()))).text)
+
+
+def _param_set(args: argparse.Namespace) -> None:
+    new = _converse(args, _after_connecting(lambda c: params.store(c, args.name.upper(), args.value)))
+    print(f"{new.name} = {new.text}")
+
+
+def _param_save(args: argparse.Namespace) -> None:
+    def script(client: Client) -> Script[Any]:
+        found = yield from params.fetch_all(client)
+        return found, client.vehicle.name
+
+    found, vehicle = _converse(args, _after_connecting(script))
+    params.write_file(args.file, found, vehicle)
+    print(f"{len(found)} parameters written to {args.file}")
+
+
+def _param_load(args: argparse.Namespace) -> None:
+    wanted = params.read_file(args.file)
+    changed = _converse(args, _after_connecting(lambda c: params.apply_file(c, args.file, wanted)))
+    for old, new in changed:
+        print(f"{new.name} = {new.text} (was {old.text})")
+    print(f"{len(changed)} of {len(wanted)} parameters changed")
+
+
+def _watch(args: argparse.Namespace) -> None:
+    from gcs_tools.watch import Watch, until
+
+    client = Client(args.system)
+    with UdpLink(args.connect) as link, Watch(client) as watch:
+        client.start(until(client, args.seconds or math.inf))
+        link.run(client, watch.update)
+
+
+def _say(make: Callable[[argparse.Namespace, Client], Script[str]]) -> Callable[[argparse.Namespace], None]:
+    """A command whose script returns what to print."""
+    return lambda args: print(_converse(args, lambda client: make(args, client)))
+
+
+_PARAM_TASKS = {
+    "list": _param_list,
+    "get": _param_get,
+    "set": _param_set,
+    "save": _param_save,
+    "load": _param_load,
+}
+_TASKS: dict[str, Callable[[argparse.Namespace], None]] = {
+    "fly": _fly,
+    "param": _param,
+    "watch": _watch,
+    "arm": _say(lambda args, client: commands.arm(client, force=args.force)),
+    "disarm": _say(lambda args, client: commands.disarm(client, force=args.force)),
+    "takeoff": _say(lambda args, client: commands.takeoff(client, height_m=args.height, wait=args.wait)),
+    "land": _say(lambda args, client: commands.land(client, wait=args.wait)),
+    "return": _say(lambda args, client: commands.return_home(client, wait=args.wait)),
+    "hold": _say(lambda _args, client: commands.mode(client, "hold")),
+    "mode": _say(lambda args, client: commands.mode(client, args.mode)),
+}
