@@ -67,7 +67,7 @@ AFTER: dict[tuple[Mode, Happening], Mode | str] = {
     **{(mode, Happening.STATIONS_LOST): "NAV_DLL_ACT" for mode in Mode if mode not in (Mode.LAND, Mode.RETURN)},
 }
 
-_LIFT_M, _LIFT_M_S = 0.01, 0.001  # a reference this far above the ground, or rising so fast, means to fly
+_LIFT_M, _LIFT_M_S = 0.03, 0.001  # a reference this far above the ground, or rising so fast, means to fly
 _TOUCH_M, _TOUCH_M_S = 0.02, 0.3
 _REST_S = 0.4  # a reference that rests on the ground so long, with the vehicle just above it, lets it down
 _NEAR_GROUND_M = 0.6
