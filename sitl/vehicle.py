@@ -84,7 +84,11 @@ class Vehicle:
         self.now_us = 0
         self.events = EventLog()
         store = store if store is not None else MemoryStore()
-        self.parameters = Parameters(declarations(spec.gains, spec.parameters), store, spec.name, self.events)
+        try:
+            declared = declarations(spec.gains, spec.parameters)
+        except KeyError as unknown:
+            raise ConfigError(f"vehicle {spec.name}: parameters: {unknown.args[0]}: unknown parameter") from None
+        self.parameters = Parameters(declared, store, spec.name, self.events)
         wind = {"SIM_WIND_N": wind_N[0], "SIM_WIND_E": wind_N[1], "SIM_WIND_D": wind_N[2], "SIM_GUST": gust_m_s}
         for name, value in {**wind, **(overrides or {})}.items():
             self._override(name, value)
