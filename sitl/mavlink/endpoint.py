@@ -1,0 +1,318 @@
+"""The vehicle's end of the MAVLink link, without sockets and clocks: datagrams and the wall time in, datagrams out.
+
+Streams run on simulation time (the vehicle's), heartbeats, repetitions and the silence of peers on wall time.
+"""
+
+import logging
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING
+
+from sitl.mavlink.codec import Definition, Frame, Parser, by_name, mav, message
+from sitl.mavlink.commands import CommandService
+from sitl.mavlink.identity import COMPONENT_ID, SIMULATOR, Identity, version
+from sitl.mavlink.link import Datagram, Link
+from sitl.mavlink.mission import MissionService
+from sitl.mavlink.offboard import OffboardService
+from sitl.mavlink.parameters import ParameterService
+from sitl.mavlink.peers import Address, Peer, PortKind
+from sitl.mavlink.requests import on_request_data_stream, vehicle_heartbeat
+from sitl.mavlink.streams import BY_ID, NEVER, STREAMS
+from sitl.onboard.modes import Event, EventKind, Severity
+
+if TYPE_CHECKING:
+    from sitl.vehicle import Vehicle
+
+__all__ = ["Address", "Datagram", "Endpoint", "Identity", "PortKind"]
+
+log = logging.getLogger(__name__)
+
+HEARTBEAT_S = 1.0
+Handler = Callable[[Peer, Frame], None]
+
+
+class Endpoint:
+    """One vehicle on the link.
+
+    system_id: MAVLink system (instance + 1); the component is the autopilot's. static_peers: served without being
+    heard. on_frame: sees the bytes of every frame, in and out (what goes to all peers alike: once).
+    """
+
+    def __init__(
+        self,
+        vehicle: "Vehicle",
+        *,
+        identity: Identity = Identity.PX4,
+        system_id: int = 1,
+        static_peers: Iterable[tuple[PortKind, Address]] = (),
+    ) -> None:
+        link = self._link = Link(vehicle, identity, system_id, static_peers)
+        self._vehicle = vehicle
+        self._parameters = ParameterService(link)
+        self._missions = MissionService(link, {mav.MAV_MISSION_TYPE_MISSION: vehicle.mission})
+        self._offboard = OffboardService(link)
+        self._commands = CommandService(link)
+        self._handlers = self._table()
+        self._event_number = vehicle.events.next_number
+        self._heartbeat_due_s = float("-inf")
+        self._gcs_heard_s: float | None = None
+        self._gcs_lost = False
+        self._deadline_s = float("-inf")
+        self._stream_due_us = 0
+        self._streamed_us = 0
+        self.faults = 0  # frames whose handling failed: a mistake in this program, logged
+
+    def _table(self) -> dict[int, tuple[Handler, int, int]]:
+        """Handlers by message id, with the places of target_system and target_component (−1: it has none)."""
+        p, m, c, o = self._parameters, self._missions, self._commands, self._offboard
+        handlers: dict[str, Handler] = {
+            "HEARTBEAT": self._on_heartbeat,
+            "PING": self._on_ping,
+            "TIMESYNC": self._on_timesync,
+            "COMMAND_LONG": c.on_long,
+            "COMMAND_INT": c.on_int,
+            "SET_MODE": c.on_set_mode,
+            "REQUEST_DATA_STREAM": lambda peer, frame: on_request_data_stream(self._link, peer, frame),
+            "PARAM_REQUEST_LIST": p.on_list,
+            "PARAM_REQUEST_READ": p.on_read,
+            "PARAM_SET": p.on_set,
+            "MISSION_COUNT": m.on_count,
+            "MISSION_ITEM_INT": m.on_item_int,
+            "MISSION_ITEM": m.on_item,
+            "MISSION_REQUEST_LIST": m.on_request_list,
+            "MISSION_REQUEST_INT": m.on_request,
+            "MISSION_REQUEST": m.on_request,
+            "MISSION_REQUEST_PARTIAL_LIST": m.on_partial_list,
+            "MISSION_WRITE_PARTIAL_LIST": m.on_partial_list,
+            "MISSION_ACK": m.on_ack,
+            "MISSION_CLEAR_ALL": m.on_clear_all,
+            "MISSION_SET_CURRENT": self._on_mission_set_current,
+            "SET_POSITION_TARGET_LOCAL_NED": o.on_local,
+            "SET_POSITION_TARGET_GLOBAL_INT": o.on_global,
+            "SET_ATTITUDE_TARGET": o.on_attitude_target,
+            "MANUAL_CONTROL": o.on_manual_control,
+        }
+        table = {}
+        for name, handler in handlers.items():
+            definition = by_name(name)
+            table[definition.id] = (handler, *_target_places(definition))
+        return table
+
+    # --- in
+
+    def receive(self, data: bytes, address: Address, kind: PortKind, wall_s: float) -> None:
+        """Take a datagram. Never raises, whatever the bytes."""
+        link = self._link
+        link.wall_s = wall_s
+        peer = link.peers.find(kind, address)
+        parser = peer.parser if peer is not None else Parser()
+        for frame in parser.feed(data):
+            if frame.system == link.system_id and frame.component == COMPONENT_ID:
+                continue  # our own, come back over some loop
+            if peer is None:
+                peer = link.peers.learn(kind, address, self._vehicle.now_us)
+                peer.parser = parser
+                self._stream_due_us = 0
+            if peer.hear(frame.version, wall_s):
+                self._greet(peer)
+            if link.on_frame is not None:
+                link.on_frame(frame.raw, False)
+            try:
+                self._dispatch(peer, frame)
+            except Exception:
+                self.faults += 1
+                log.exception("handling %s failed", frame.name)
+
+    def _dispatch(self, peer: Peer, frame: Frame) -> None:
+        entry = self._handlers.get(frame.id)
+        if entry is None:
+            return
+        handler, system_place, component_place = entry
+        values = frame.message
+        if system_place >= 0 and values[system_place] not in (0, self._link.system_id):
+            return
+        if component_place >= 0 and values[component_place] not in (0, COMPONENT_ID):
+            return
+        handler(peer, frame)
+        self._deadline_s = float("-inf")  # a transfer may have begun, a rate changed: look again at the next poll
+        self._stream_due_us = 0
+
+    def _greet(self, peer: Peer) -> None:
+        text = f"{SIMULATOR} {'.'.join(map(str, version()))}: simulated '{self._vehicle.spec.name}'"
+        self._link.tell(peer, Severity.INFO, text)
+
+    def _on_heartbeat(self, _peer: Peer, frame: Frame) -> None:
+        if frame.message.type == mav.MAV_TYPE_GCS:
+            self._gcs_heard_s = self._link.wall_s
+            if self._gcs_lost:
+                self._gcs_lost = False
+                self._vehicle.commander.link_lost(False)
+
+    def _on_ping(self, peer: Peer, frame: Frame) -> None:
+        m = frame.message
+        if not m.target_system and not m.target_component:
+            back = {"target_system": frame.system, "target_component": frame.component}
+            self._link.send(peer, message("PING", time_usec=m.time_usec, seq=m.seq, **back))
+
+    def _on_timesync(self, peer: Peer, frame: Frame) -> None:
+        """Answered with the vehicle's clock, which is the one that targets are stamped with."""
+        m = frame.message
+        if m.tc1 == 0:
+            back = {"target_system": frame.system, "target_component": frame.component}
+            self._link.send(peer, message("TIMESYNC", tc1=self._vehicle.now_us * 1000, ts1=m.ts1, **back))
+
+    def _on_mission_set_current(self, peer: Peer, frame: Frame) -> None:
+        outcome = self._vehicle.mission.set_current(frame.message.seq)
+        if not outcome.ok:
+            self._link.complain(peer, outcome.reason)
+
+    # --- out
+
+    def poll(self, wall_s: float) -> list[Datagram]:
+        """All that is due now. Call it after `receive` and whenever simulation time has moved."""
+        link, vehicle = self._link, self._vehicle
+        link.wall_s = wall_s
+        if vehicle.events.next_number != self._event_number:
+            self._tell_events()
+        if wall_s >= self._deadline_s:
+            self._keep_time()
+        now_us = vehicle.now_us
+        if now_us >= self._stream_due_us or now_us < self._streamed_us:
+            self._stream(now_us)
+        out = link.outbox
+        if out:
+            link.outbox = []
+        return out
+
+    def next_deadline(self) -> float:
+        """Wall time of the next heartbeat, repetition or timeout: poll by then even if nothing else happens."""
+        return self._deadline_s
+
+    def _stream(self, now_us: int) -> None:
+        link = self._link
+        if now_us < self._streamed_us:  # the simulation was set back
+            for peer in link.peers:
+                peer.schedule.rewind(now_us)
+        self._streamed_us = now_us
+        next_us = NEVER
+        for peer in link.peers:
+            schedule = peer.schedule
+            if schedule.next_us <= now_us:
+                self._send_streams(peer, schedule.take(now_us))
+            next_us = min(next_us, schedule.next_us)
+        self._stream_due_us = next_us
+
+    def _send_streams(self, peer: Peer, due: list[int]) -> None:
+        link = self._link
+        view = link.view()
+        payloads = view.payloads
+        for k in due:
+            payload = payloads.get(k)
+            if payload is None:
+                try:
+                    payload = STREAMS[k].payload(view)
+                except Exception:  # a number that fits no field: what a diverged simulation has to offer
+                    payload = b""
+                payloads[k] = payload
+            if payload:
+                link.post(peer, STREAMS[k].definition, payload)
+
+    def _keep_time(self) -> None:
+        """Wall-clock duties."""
+        link, now_s = self._link, self._link.wall_s
+        if now_s >= self._heartbeat_due_s:
+            link.peers.forget_silent(now_s, self._vehicle.now_us)
+            self._stream_due_us = 0
+            self._beat()
+        deadline_s = self._watch_ground_stations(now_s)
+        self._missions.advance()
+        self._parameters.advance()
+        self._deadline_s = min(
+            self._heartbeat_due_s, deadline_s, self._missions.deadline_s, self._parameters.deadline_s
+        )
+
+    def _beat(self) -> None:
+        self._heartbeat_due_s = self._link.wall_s + HEARTBEAT_S
+        self._link.broadcast(vehicle_heartbeat(self._link))
+
+    def _watch_ground_stations(self, now_s: float) -> float:
+        """Tell the commander when the last ground station has gone quiet. Returns when that would be."""
+        if self._gcs_heard_s is None or self._gcs_lost:
+            return float("inf")
+        lost_s = self._gcs_heard_s + self._vehicle.parameters["COM_DL_LOSS_T"]
+        if now_s < lost_s:
+            return lost_s
+        self._gcs_lost = True
+        self._vehicle.commander.link_lost(True)
+        return float("inf")
+
+    # --- what has happened on board
+
+    def _tell_events(self) -> None:
+        events = self._vehicle.events.since(self._event_number)
+        self._event_number = self._vehicle.events.next_number
+        for event in events:
+            teller = self._TELLERS.get(event.kind)
+            if teller is not None:
+                teller(self, event)
+        if any(event.kind in (EventKind.MODE, EventKind.ARMED) for event in events):
+            self._beat()
+            self._deadline_s = float("-inf")
+
+    def _tell_text(self, event: Event) -> None:
+        self._link.tell(None, event.severity, event.text)
+
+    def _tell_parameter(self, event: Event) -> None:
+        self._parameters.on_change(event)
+
+    def _tell_reached(self, event: Event) -> None:
+        self._link.broadcast(message("MISSION_ITEM_REACHED", seq=event.value))
+
+    def _tell_stream(self, name: str) -> None:
+        """What normally flows slowly, at once."""
+        view = self._link.view()
+        for k in BY_ID[by_name(name).id]:
+            self._link.broadcast_packed(STREAMS[k].definition, STREAMS[k].payload(view))
+
+    _TELLERS: "dict[EventKind, Callable[[Endpoint, Event], None]]" = {  # noqa: RUF012
+        EventKind.TEXT: _tell_text,
+        EventKind.PARAMETER: _tell_parameter,
+        EventKind.ITEM_REACHED: _tell_reached,
+        EventKind.ITEM_CURRENT: lambda self, _event: self._tell_stream("MISSION_CURRENT"),
+        EventKind.MISSION: lambda self, _event: self._tell_stream("MISSION_CURRENT"),
+        EventKind.MODE: lambda self, _event: self._tell_stream("CURRENT_MODE"),
+        EventKind.LANDED: lambda self, _event: self._tell_stream("EXTENDED_SYS_STATE"),
+        EventKind.HOME: lambda self, _event: self._tell_stream("HOME_POSITION"),
+    }
+
+    # --- what the caller may ask and set
+
+    @property
+    def on_frame(self) -> Callable[[bytes, bool], None] | None:
+        """Called with the bytes of every frame; the flag says that it goes out."""
+        return self._link.on_frame
+
+    @on_frame.setter
+    def on_frame(self, tap: Callable[[bytes, bool], None] | None) -> None:
+        self._link.on_frame = tap
+
+    @property
+    def shutdown_requested(self) -> bool:
+        return self._link.shutdown_requested
+
+    @property
+    def reboot_requested(self) -> bool:
+        return self._link.reboot_requested
+
+    @property
+    def peers(self) -> tuple[Peer, ...]:
+        """Who is being served."""
+        return tuple(self._link.peers)
+
+
+def _target_places(definition: Definition) -> tuple[int, int]:
+    names = [field.name for field in definition.fields]
+    system = "target_system" if "target_system" in names else "target"
+    return (
+        names.index(system) if system in names else -1,
+        names.index("target_component") if "target_component" in names else -1,
+    )

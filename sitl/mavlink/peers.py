@@ -1,0 +1,105 @@
+"""Who is on the other side: addresses, each with its own numbering, parser, stream rates and transfers.
+
+A peer that sends one sound frame to either port is learned by its address and served until it falls silent. Static
+peers (the ports where ground stations and offboard programs listen by convention) are served always; falling silent
+takes them back to what they were before they were heard. Forgetting a peer forgets all that was kept for it.
+"""
+
+from collections.abc import Iterable, Iterator
+from enum import Enum
+
+from sitl.mavlink.codec import Encoder, Parser
+from sitl.mavlink.commands import Answers
+from sitl.mavlink.identity import COMPONENT_ID
+from sitl.mavlink.parameters import Listing
+from sitl.mavlink.streams import Schedule
+
+Address = tuple[str, int]
+
+SILENT_S = 15.0  # wall time after which a peer is forgotten: a ground station heartbeats every second
+LEARNED_MAX = 64  # peers beyond the static ones; the one longest unheard makes way
+
+
+class PortKind(Enum):
+    """Which of the vehicle's two ports: they differ in the default rates of their streams."""
+
+    GCS = "gcs"
+    ONBOARD = "onboard"
+
+
+class Peer:
+    """One address at one port."""
+
+    def __init__(self, kind: PortKind, address: Address, system_id: int, now_us: int, *, static: bool = False) -> None:
+        self.kind = kind
+        self.address = address
+        self.static = static
+        self.encoder = Encoder(system_id, COMPONENT_ID)
+        self.reset(now_us)
+
+    def reset(self, now_us: int) -> None:
+        """As if never heard; only the count of frames goes on."""
+        self.heard_s: float | None = None
+        self.encoder.version = 2
+        self.speaks_v2 = False
+        self.parser = Parser()
+        self.schedule = Schedule(self.kind is PortKind.ONBOARD, now_us)
+        self.listing = Listing()
+        self.answers = Answers()
+        self.complaints: dict[str, float] = {}  # refusals told, and when: a stream of bad targets is one text
+
+    def hear(self, version: int, wall_s: float) -> bool:
+        """Note a sound frame in `version` of the framing; True if it is the first one."""
+        first = self.heard_s is None
+        self.heard_s = wall_s
+        if version == 2:
+            self.speaks_v2 = True
+        self.encoder.version = 2 if self.speaks_v2 else 1
+        return first
+
+
+class Peers:
+    """All peers of one vehicle."""
+
+    def __init__(self, system_id: int, static: Iterable[tuple[PortKind, Address]], now_us: int) -> None:
+        self._system_id = system_id
+        self._peers: dict[tuple[PortKind, Address], Peer] = {}
+        for kind, address in static:
+            self._peers[kind, address] = Peer(kind, address, system_id, now_us, static=True)
+
+    def __iter__(self) -> Iterator[Peer]:
+        return iter(self._peers.values())
+
+    def __len__(self) -> int:
+        return len(self._peers)
+
+    def __contains__(self, peer: Peer) -> bool:
+        return self._peers.get((peer.kind, peer.address)) is peer
+
+    @property
+    def primary(self) -> Peer | None:
+        """The first peer: what goes out to all is shown once, as it goes to this one."""
+        return next(iter(self._peers.values()), None)
+
+    def find(self, kind: PortKind, address: Address) -> Peer | None:
+        return self._peers.get((kind, address))
+
+    def learn(self, kind: PortKind, address: Address, now_us: int) -> Peer:
+        """A new peer, in place of the one longest unheard if there are too many."""
+        learned = [peer for peer in self._peers.values() if not peer.static]
+        if len(learned) >= LEARNED_MAX:
+            oldest = min(learned, key=lambda peer: peer.heard_s or 0.0)
+            del self._peers[oldest.kind, oldest.address]
+        peer = Peer(kind, address, self._system_id, now_us)
+        self._peers[kind, address] = peer
+        return peer
+
+    def forget_silent(self, wall_s: float, now_us: int) -> None:
+        """Drop the learned peers that have been silent too long, and take the static ones back to their start."""
+        for key, peer in list(self._peers.items()):
+            if peer.heard_s is None or wall_s - peer.heard_s < SILENT_S:
+                continue
+            if peer.static:
+                peer.reset(now_us)
+            else:
+                del self._peers[key]

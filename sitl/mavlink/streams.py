@@ -1,0 +1,156 @@
+"""Which messages flow by themselves, how often, and when the next one of each is due.
+
+Streams run on simulation time. Default rates are those of PX4's SITL on its two ports. What a peer asked for
+(SET_MESSAGE_INTERVAL, REQUEST_DATA_STREAM) is kept in its Schedule.
+"""
+
+import heapq
+from collections.abc import Callable
+from typing import NamedTuple
+
+from sitl.mavlink import messages
+from sitl.mavlink.codec import Definition, by_name, mav
+from sitl.mavlink.view import View
+
+NEVER = 1 << 62
+SHORTEST_US = 1000  # between two messages of one stream
+DEFAULT, OFF = 0, -1  # intervals with a meaning of their own in SET_MESSAGE_INTERVAL
+
+
+class Stream(NamedTuple):
+    """One message that can flow. Rates in Hz of simulation time, 0 = only when asked for."""
+
+    definition: Definition
+    values: Callable[[View], messages.Values]
+    gcs_Hz: float
+    onboard_Hz: float
+
+    def payload(self, view: View) -> bytes:
+        return self.definition.pack(*self.values(view))
+
+
+def _stream(
+    name: str, gcs_Hz: float, onboard_Hz: float, values: Callable[[View], messages.Values] | None = None
+) -> Stream:
+    return Stream(by_name(name), values or getattr(messages, name.lower()), gcs_Hz, onboard_Hz)
+
+
+STREAMS = (
+    _stream("ATTITUDE", 50, 100),
+    _stream("ATTITUDE_QUATERNION", 50, 50),
+    _stream("LOCAL_POSITION_NED", 30, 30),
+    _stream("HIGHRES_IMU", 0, 50),
+    _stream("GLOBAL_POSITION_INT", 50, 50),
+    _stream("POSITION_TARGET_LOCAL_NED", 50, 10),
+    _stream("POSITION_TARGET_GLOBAL_INT", 1, 10),
+    _stream("ATTITUDE_TARGET", 50, 10),
+    _stream("SERVO_OUTPUT_RAW", 20, 10),
+    _stream("ACTUATOR_OUTPUT_STATUS", 0, 10),
+    _stream("VFR_HUD", 4, 10),
+    _stream("GPS_RAW_INT", 5, 10),
+    _stream("ALTITUDE", 1, 10),
+    _stream("WIND_COV", 0.5, 10),
+    _stream("DEBUG_VECT", 10, 10, messages.paper_angles),
+    _stream("DEBUG_VECT", 10, 10, messages.thrusts),
+    _stream("DEBUG_VECT", 10, 10, messages.flaps),
+    _stream("SYS_STATUS", 1, 5),
+    _stream("EXTENDED_SYS_STATE", 1, 5),
+    _stream("BATTERY_STATUS", 0.5, 0.5),
+    _stream("HOME_POSITION", 0.5, 0.5),
+    _stream("GPS_GLOBAL_ORIGIN", 1, 1),
+    _stream("SCALED_PRESSURE", 1, 1),
+    _stream("ESTIMATOR_STATUS", 0.5, 1),
+    _stream("VIBRATION", 0.1, 0.5),
+    _stream("MISSION_CURRENT", 1, 1),
+    _stream("CURRENT_MODE", 0.5, 0.5),
+    _stream("SYSTEM_TIME", 1, 1),
+    _stream("UTM_GLOBAL_POSITION", 0, 0),
+    _stream("HIL_STATE_QUATERNION", 0, 0),
+)
+
+BY_ID: dict[int, tuple[int, ...]] = {
+    stream.definition.id: tuple(k for k, other in enumerate(STREAMS) if other.definition.id == stream.definition.id)
+    for stream in STREAMS
+}
+"""Places in STREAMS by message id: one id may carry several (DEBUG_VECT under three names)."""
+
+_GROUPS = {
+    mav.MAV_DATA_STREAM_RAW_SENSORS: ("HIGHRES_IMU", "SCALED_PRESSURE", "VIBRATION", "GPS_RAW_INT"),
+    mav.MAV_DATA_STREAM_EXTENDED_STATUS: ("SYS_STATUS", "EXTENDED_SYS_STATE", "BATTERY_STATUS", "GPS_RAW_INT"),
+    mav.MAV_DATA_STREAM_RC_CHANNELS: ("SERVO_OUTPUT_RAW",),
+    mav.MAV_DATA_STREAM_RAW_CONTROLLER: ("ATTITUDE_TARGET", "ACTUATOR_OUTPUT_STATUS"),
+    mav.MAV_DATA_STREAM_POSITION: ("GLOBAL_POSITION_INT", "LOCAL_POSITION_NED", "POSITION_TARGET_LOCAL_NED"),
+    mav.MAV_DATA_STREAM_EXTRA1: ("ATTITUDE", "ATTITUDE_QUATERNION"),
+    mav.MAV_DATA_STREAM_EXTRA2: ("VFR_HUD", "ALTITUDE"),
+    mav.MAV_DATA_STREAM_EXTRA3: ("ESTIMATOR_STATUS", "WIND_COV", "SYSTEM_TIME"),
+}
+
+
+def group_members(group: int) -> set[int]:
+    """Message ids of a MAV_DATA_STREAM; MAV_DATA_STREAM_ALL is all groups together. Empty for an unknown one."""
+    groups = _GROUPS.values() if group == mav.MAV_DATA_STREAM_ALL else (_GROUPS.get(group, ()),)
+    return {by_name(name).id for names in groups for name in names}
+
+
+def _interval(rate_Hz: float) -> int:
+    return round(1e6 / rate_Hz) if rate_Hz > 0.0 else OFF
+
+
+_DEFAULT_INTERVALS = {
+    True: [_interval(stream.onboard_Hz) for stream in STREAMS],
+    False: [_interval(stream.gcs_Hz) for stream in STREAMS],
+}
+
+
+class Schedule:
+    """One peer's streams: a heap of (due, place in STREAMS), so that looking costs only what is due."""
+
+    __slots__ = ("_heap", "_onboard", "intervals_us", "next_us")
+
+    def __init__(self, onboard: bool, now_us: int) -> None:
+        self._onboard = onboard
+        self.intervals_us = list(_DEFAULT_INTERVALS[onboard])
+        self._rebuild(now_us)
+
+    def _rebuild(self, now_us: int) -> None:
+        self._heap = [(now_us, k) for k, interval in enumerate(self.intervals_us) if interval > 0]
+        self._heap.append((NEVER, -1))
+        heapq.heapify(self._heap)
+        self.next_us = self._heap[0][0]
+
+    def take(self, now_us: int) -> list[int]:
+        """The streams that are due, each once however late, on its own grid from here on."""
+        heap, due = self._heap, []
+        while (at_us := heap[0][0]) <= now_us:
+            k = heap[0][1]
+            interval = self.intervals_us[k]
+            next_us = at_us + interval
+            if next_us <= now_us:
+                next_us += (now_us - at_us) // interval * interval
+                if next_us <= now_us:
+                    next_us += interval
+            heapq.heapreplace(heap, (next_us, k))
+            due.append(k)
+        self.next_us = heap[0][0]
+        return due
+
+    def set_interval(self, message_id: int, interval_us: int, now_us: int) -> None:
+        """Interval of a message in µs, DEFAULT or OFF; a new rate starts now. Raises KeyError for other messages."""
+        places = BY_ID[message_id]
+        for k in places:
+            default = _DEFAULT_INTERVALS[self._onboard][k]
+            self.intervals_us[k] = default if interval_us == DEFAULT else max(interval_us, SHORTEST_US)
+            if interval_us == OFF:
+                self.intervals_us[k] = OFF
+        self._heap = [entry for entry in self._heap if entry[1] not in places]
+        self._heap += [(now_us, k) for k in places if self.intervals_us[k] > 0]
+        heapq.heapify(self._heap)
+        self.next_us = self._heap[0][0]
+
+    def interval(self, message_id: int) -> int:
+        """Interval of a message in µs, OFF if it doesn't flow. Raises KeyError for other messages."""
+        return self.intervals_us[BY_ID[message_id][0]]
+
+    def rewind(self, now_us: int) -> None:
+        """Start over after simulation time was set back."""
+        self._rebuild(now_us)

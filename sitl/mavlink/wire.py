@@ -1,0 +1,113 @@
+"""Units and frames of the wire: degrees × 1e7, millimetres, centimetres per second, the multicopter's attitude.
+
+MAVLink shows a tail-sitter in hover as a multicopter: q_mav = q_NB ⊗ q_y(−90°), so that upright hover reads
+roll = pitch = 0, and yaw is where the belly faces. The paper's yaw (about body z) is therefore the wire's roll, the
+paper's roll the wire's minus yaw.
+"""
+
+import math
+import struct
+from typing import NamedTuple
+
+from sitl.frames import euler_321, wire_quaternion, wire_rates
+from sitl.navigation import NavState
+from sitl.quaternion import Quat, Vec3
+
+INT32_UNSET = 0x7FFFFFFF  # "no value" in an integer coordinate
+UINT16_UNSET = 0xFFFF
+INT16_UNSET = 0x7FFF
+NAN = math.nan
+
+_FLOAT, _INT = struct.Struct("<f"), struct.Struct("<i")
+
+
+class WireAttitude(NamedTuple):
+    """Attitude and rates in the multicopter frame (rad, rad/s)."""
+
+    q: Quat
+    roll: float
+    pitch: float
+    yaw: float
+    rollspeed: float
+    pitchspeed: float
+    yawspeed: float
+
+
+def wire_attitude(nav: NavState) -> WireAttitude:
+    """The navigation state's attitude and rates as MAVLink shows them."""
+    q = wire_quaternion(nav.qw, nav.qx, nav.qy, nav.qz)
+    return WireAttitude(q, *euler_321(*q), *wire_rates(nav.p_rad_s, nav.q_rad_s, nav.r_rad_s))
+
+
+def body_vector_on_wire(v_B: Vec3) -> Vec3:
+    """A vector of body axes in the multicopter frame: its x is body z, its z is against body x."""
+    return v_B[2], v_B[1], -v_B[0]
+
+
+def clamped(value: float, low: int, high: int) -> int:
+    """The nearest integer in low … high; NaN gives `low`."""
+    if value >= high:
+        return high
+    return round(value) if value > low else low
+
+
+def int16(value: float) -> int:
+    """The nearest 16-bit integer that doesn't read as unset."""
+    return clamped(value, -32767, 32766)
+
+
+def uint16(value: float) -> int:
+    """The nearest unsigned 16-bit integer that doesn't read as unset."""
+    return clamped(value, 0, 65534)
+
+
+def degE7(degrees: float) -> int:
+    """Latitude or longitude."""
+    return clamped(degrees * 1e7, -1_800_000_000, 1_800_000_000)
+
+
+def mm(metres: float) -> int:
+    return clamped(metres * 1e3, -2_147_483_647, 2_147_483_646)
+
+
+def cm_s(metres_per_second: float) -> int:
+    """Signed speed in 16 bits."""
+    return int16(metres_per_second * 100.0)
+
+
+def cdeg(heading_rad: float) -> int:
+    """Heading in 0 … 35999."""
+    return round(math.degrees(heading_rad) * 100.0) % 36000 if math.isfinite(heading_rad) else UINT16_UNSET
+
+
+def degrees_from_degE7(value: int) -> float:
+    """Degrees; NaN where the field says unset."""
+    return value * 1e-7 if value != INT32_UNSET else NAN
+
+
+def float32(value: float) -> float:
+    """What is left of a value in a 32-bit float; beyond its range, infinity."""
+    try:
+        result: float = _FLOAT.unpack(_FLOAT.pack(value))[0]
+    except OverflowError:
+        return math.copysign(math.inf, value)
+    return result
+
+
+def float_of_int(value: int) -> float:
+    """The float with the bytes of a 32-bit integer: how integer parameters travel in PARAM_VALUE and PARAM_SET."""
+    result: float = _FLOAT.unpack(_INT.pack(value))[0]
+    return result
+
+
+def int_of_float(value: float) -> int:
+    """The 32-bit integer in the bytes of a float, see `float_of_int`."""
+    result: int = _INT.unpack(_FLOAT.pack(value))[0]
+    return result
+
+
+def boot_time_us(time_boot_ms: int, now_us: int) -> int:
+    """The 32-bit millisecond stamp as microseconds on the vehicle's clock: of all its wraps the one nearest to now."""
+    now_ms = now_us // 1000
+    offset = (time_boot_ms - now_ms + 0x8000_0000) % 0x1_0000_0000 - 0x8000_0000
+    return (now_ms + offset) * 1000

@@ -1,0 +1,163 @@
+"""Message rates and messages on request."""
+
+from collections.abc import Callable
+
+import pytest
+from mavlink_pair import World
+
+from sitl.mavlink.codec import by_name, mav
+from sitl.mavlink.endpoint import PortKind
+from sitl.mavlink.streams import STREAMS
+
+DENIED = mav.MAV_RESULT_DENIED
+
+
+@pytest.mark.parametrize(("kind", "attitude"), [(PortKind.ONBOARD, 100), (PortKind.GCS, 50)])
+def test_default_rates_differ_by_port(world: World, kind: PortKind, attitude: int) -> None:
+    station = world.station(kind=kind)
+    station.forget()
+    world.run(4.0)
+    assert len(station.all("ATTITUDE")) == pytest.approx(4 * attitude, abs=4)
+    assert len(station.all("LOCAL_POSITION_NED")) == pytest.approx(120, abs=4)
+    for name in ("YXZ_DEG", "THRUST_N", "FLAP_DEG"):
+        assert len([m for m in station.all("DEBUG_VECT") if m.name == name]) == pytest.approx(40, abs=2)
+    assert station.all("UTM_GLOBAL_POSITION") == []
+    assert station.all("HIL_STATE_QUATERNION") == []
+
+
+@pytest.mark.parametrize("name", sorted({stream.definition.name for stream in STREAMS}))
+def test_every_stream_can_be_requested_and_set(world: World, name: str) -> None:
+    station = world.station()
+    number = by_name(name).id
+    assert station.ask(mav.MAV_CMD_SET_MESSAGE_INTERVAL, number, -1) == [0]
+    station.forget()
+    world.run(0.3)
+    assert station.all(name) == []
+    assert station.ask(mav.MAV_CMD_REQUEST_MESSAGE, number) == [0]
+    assert len(station.all(name)) == (3 if name == "DEBUG_VECT" else 1)
+    assert station.ask(mav.MAV_CMD_SET_MESSAGE_INTERVAL, number, 100_000) == [0]
+    station.forget()
+    world.run(1.0)
+    assert len(station.all(name)) == pytest.approx(30 if name == "DEBUG_VECT" else 10, abs=3)
+
+
+def test_the_interval_in_force_is_told(world: World) -> None:
+    station = world.station()
+    for message_id, expected in ((30, 10_000), (115, -1), (77, 0)):
+        station.forget()
+        assert station.ask(mav.MAV_CMD_GET_MESSAGE_INTERVAL, message_id) == [0]
+        [m] = station.all("MESSAGE_INTERVAL")
+        assert (m.message_id, m.interval_us) == (message_id, expected)
+    station.ask(mav.MAV_CMD_SET_MESSAGE_INTERVAL, 30, 40_000)
+    station.forget()
+    assert station.ask(mav.MAV_CMD_REQUEST_MESSAGE, 244, 30) == [0]
+    assert station.all("MESSAGE_INTERVAL")[0].interval_us == 40_000
+    station.ask(mav.MAV_CMD_SET_MESSAGE_INTERVAL, 30, 0)
+    station.forget()
+    station.ask(mav.MAV_CMD_REQUEST_MESSAGE, 244, 30)
+    assert station.all("MESSAGE_INTERVAL")[0].interval_us == 10_000
+
+
+@pytest.mark.parametrize(
+    ("message_id", "interval"),
+    [(77, 1e5), (9999, 1e5), (30, -7), (30, float("nan")), (float("nan"), 1e5), (30.5, 1e5), (30, 1e13), (-1, 0)],
+)
+def test_impossible_intervals_are_denied_and_change_nothing(world: World, message_id: float, interval: float) -> None:
+    station = world.station()
+    assert station.ask(mav.MAV_CMD_SET_MESSAGE_INTERVAL, message_id, interval) == [DENIED]
+    (peer,) = world.endpoint.peers
+    assert peer.schedule.interval(30) == 10_000
+
+
+def test_a_data_stream_request_sets_the_rate_of_its_group(world: World) -> None:
+    station = world.station()
+    station.send("REQUEST_DATA_STREAM", target_system=1, req_stream_id=10, req_message_rate=5, start_stop=1)
+    world.run(0.05)
+    station.forget()
+    world.run(2.0)
+    assert len(station.all("ATTITUDE")) == pytest.approx(10, abs=1)
+    assert len(station.all("LOCAL_POSITION_NED")) == pytest.approx(60, abs=2)
+    station.send("REQUEST_DATA_STREAM", target_system=1, req_stream_id=0, req_message_rate=0, start_stop=0)
+    world.run(0.05)
+    station.forget()
+    world.run(1.0)
+    assert station.all("ATTITUDE") == station.all("VFR_HUD") == []
+    assert station.all("SYSTEM_TIME") == []
+    assert station.all("GPS_GLOBAL_ORIGIN")  # belongs to no group
+
+
+def test_connecting_ground_stations_get_what_they_ask_for_or_a_refusal(world: World) -> None:
+    """The order in which QGroundControl asks."""
+    station = world.station(kind=PortKind.GCS)
+    assert station.ask(mav.MAV_CMD_REQUEST_MESSAGE, 148) == [0]
+    [version] = station.all("AUTOPILOT_VERSION")
+    assert version.flight_sw_version & 0xFF == 0  # FIRMWARE_VERSION_TYPE_DEV
+    assert version.vendor_id != 0
+    assert version.capabilities & mav.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+    assert version.capabilities & mav.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
+    assert not version.capabilities & mav.MAV_PROTOCOL_CAPABILITY_FTP
+    assert not version.capabilities & mav.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
+    assert not version.capabilities & mav.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET
+    assert station.ask(mav.MAV_CMD_REQUEST_MESSAGE, 300) == [0]
+    assert station.all("PROTOCOL_VERSION")[0].version == 200
+    assert station.ask(mav.MAV_CMD_REQUEST_MESSAGE, 435, 0) == [0]
+    modes = station.all("AVAILABLE_MODES")
+    assert [m.mode_index for m in modes] == list(range(1, 8))
+    assert {m.number_modes for m in modes} == {7}
+    assert {m.custom_mode for m in modes} == {
+        196608, 33816576, 50593792, 67371008, 84148224, 100925440, 393216,
+    }  # fmt: skip
+    for component_metadata in (397, 395):
+        assert station.ask(mav.MAV_CMD_REQUEST_MESSAGE, component_metadata) == [DENIED]
+
+
+def test_one_mode_may_be_asked_for_alone_and_no_mode_that_is_not_there(world: World) -> None:
+    station = world.station()
+    assert station.ask(mav.MAV_CMD_REQUEST_MESSAGE, 435, 4) == [0]
+    assert [m.mode_name for m in station.all("AVAILABLE_MODES")] == ["Mission"]
+    assert station.ask(mav.MAV_CMD_REQUEST_MESSAGE, 435, 8) == [DENIED]
+
+
+@pytest.mark.parametrize(
+    ("command", "name"),
+    [(410, "HOME_POSITION"), (519, "PROTOCOL_VERSION"), (520, "AUTOPILOT_VERSION")],
+)
+def test_the_older_request_commands_still_work(world: World, command: int, name: str) -> None:
+    station = world.station()
+    station.ask(mav.MAV_CMD_SET_MESSAGE_INTERVAL, 242, -1)
+    station.forget()
+    assert station.ask(command) == [0]
+    assert len(station.all(name)) == 1
+
+
+@pytest.mark.parametrize("message_id", [float("nan"), -1, 77, 1e9])
+def test_messages_that_cannot_be_had_are_denied(world: World, message_id: float) -> None:
+    assert world.station().ask(mav.MAV_CMD_REQUEST_MESSAGE, message_id) == [DENIED]
+
+
+def test_streams_start_over_when_simulation_time_is_set_back(make_world: Callable[..., World]) -> None:
+    world = make_world()
+    station = world.station()
+    world.run(2.0)
+    world.vehicle.now_us = 0
+    world._simulated_us = 0.0
+    station.forget()
+    world.run(1.0)
+    assert len(station.all("ATTITUDE")) > 90
+
+
+def test_a_diverged_simulation_keeps_the_link_up(world: World) -> None:
+    station = world.station()
+    real = world.vehicle.snapshot
+    nan = float("nan")
+
+    def broken() -> object:
+        s = real()
+        return s._replace(nav=s.nav._replace(qw=nan, north_m=1e300, down_m=nan, v_east_m_s=-1e300))
+
+    world.vehicle.snapshot = broken
+    station.forget()
+    world.run(1.5)
+    assert station.all("HEARTBEAT")
+    assert station.all("SYS_STATUS")
+    assert station.ask(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1) == [0]
