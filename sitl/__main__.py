@@ -1,0 +1,300 @@
+"""The `sitl` command line: run the vehicle behind its links, fly a mission in lockstep, find a trim."""
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NoReturn, TypeVar
+
+from sitl.daemon import config
+
+T = TypeVar("T")
+
+VEHICLES = """\
+vehicles:
+  yawsitter         the paper's gains, ideal actuators and sensors, 500 Hz (default)
+  yawsitter-real    motor and flap lag, sensor noise, retuned gains
+  FILE.yaml         your own: airframe, gains, actuators and sensors
+"""
+
+RUN = f"""\
+Run one vehicle: it is simulated in real time and spoken to over MAVLink (UDP) and Zenoh, until Ctrl-C.
+
+Instance I (default 0) uses, like PX4's simulator:
+  UDP 18570+I  for ground stations, sending to 127.0.0.1:14550 from the start (QGroundControl finds it by itself)
+  UDP 14580+I  for onboard computers, sending to 127.0.0.1:14540+I from the start (MAVSDK's default is 14540)
+  TCP 7447+I   Zenoh telemetry, keys yawsitter/I/... (docs/telemetry.md)
+Whoever writes to a UDP port is served too. The MAVLink system id is I+1. Instances 0 to 39 keep out of each other's
+ports. Everything listens on this machine only, unless --listen says otherwise.
+
+{VEHICLES}"""
+
+RUN_EXAMPLES = """\
+examples:
+  sitl run                                         the default vehicle in real time
+  sitl run --vehicle yawsitter-real --speed 10     ten times real time
+  sitl run --speed max --no-zenoh                  as fast as the machine can
+  sitl run --home 47.3977,8.5456,488,90            latitude, longitude, altitude AMSL [m], heading [deg]
+  sitl run --wind 1,0,0 --gust 0.5 --seed 7        air moving north at 1 m/s, with gusts
+  sitl run --listen 0.0.0.0 --gcs 192.168.1.20:14550    a ground station on another machine
+  sitl run --set RATE_Y_P=0.4 --set SIM_TLM_RATE=100    parameters, as if written over the link
+  sitl run --instance 1 --record logs              a second vehicle, every MAVLink frame kept in logs/*.tlog
+
+While it runs, the parameters SIM_SPEED (0: as fast as possible), SIM_PAUSE and SIM_STEP_MS (run so many milliseconds
+while paused) change its pace, and SIM_WIND_N, SIM_WIND_E, SIM_WIND_D and SIM_GUST the air.
+
+exit status: 0 after Ctrl-C, SIGTERM or a shutdown command; 2 for settings that can't be used.
+"""
+
+FLY = f"""\
+Fly a mission: vehicle and client in one process, in lockstep, through the same MAVLink bytes as over UDP, as fast as
+the machine can. The same seed and settings give the same flight, bit for bit.
+
+{VEHICLES}"""
+
+FLY_EXAMPLES = """\
+examples:
+  sitl fly missions/rectangle.yaml
+  sitl fly missions/circle.yaml --vehicle yawsitter-real --seed 3
+  sitl fly missions/rectangle.yaml --wind 1,0,0 --gust 0.5 --json
+  sitl fly missions/hover.yaml --set RATE_Y_P=0.4 --out out/hover
+  sitl fly plan.plan                               a QGroundControl plan
+
+exit status: 0 when the mission was flown, 1 when it was not, 2 for settings that can't be used.
+"""
+
+TRIM = f"""\
+Find the steady state of level flight at an airspeed (0: hover): pitch, thrust and flap deflection.
+
+{VEHICLES}"""
+
+TRIM_EXAMPLES = """\
+examples:
+  sitl trim
+  sitl trim --airspeed 5 --json
+"""
+
+_HELP_RUN = "run a vehicle behind MAVLink and Zenoh, in real time or faster"
+_HELP_FLY = "fly a mission in one process and print the error table"
+_HELP_TRIM = "find hover or level-flight trim"
+
+
+class _Parser(argparse.ArgumentParser):
+    """Answers a mistake with one line."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
+def _reader(parse: Callable[[str], T]) -> Callable[[str], T]:
+    """`parse` as an argparse type: its refusal becomes argparse's."""
+
+    def read(text: str) -> T:
+        try:
+            return parse(text)
+        except config.SettingError as refusal:
+            raise argparse.ArgumentTypeError(str(refusal)) from None
+
+    return read
+
+
+def _airspeed(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0.0 <= value <= 50.0:
+        raise config.SettingError(f"'{text}' is not a speed from 0 to 50 m/s")
+    return value
+
+
+def _add_vehicle(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--vehicle", default="yawsitter", metavar="NAME|FILE", help="which vehicle (yawsitter)")
+
+
+def _add_simulation(parser: argparse.ArgumentParser, speed: str) -> None:
+    parser.add_argument(
+        "--speed",
+        type=_reader(config.parse_speed),
+        default=config.parse_speed(speed),
+        metavar="FACTOR|max",
+        help=f"of real time, or max: as fast as possible ({speed})",
+    )
+    parser.add_argument(
+        "--wind",
+        type=_reader(config.parse_wind),
+        default=(0.0, 0.0, 0.0),
+        metavar="N,E,D",
+        help="where the air moves, m/s north, east, down (0,0,0)",
+    )
+    parser.add_argument(
+        "--gust",
+        type=_reader(config.parse_gust),
+        default=0.0,
+        metavar="M_S",
+        help="standard deviation of turbulence, m/s (0)",
+    )
+    parser.add_argument(
+        "--seed",
+        type=_reader(config.parse_seed),
+        default=1,
+        metavar="N",
+        help="of gusts and sensor noise (1)",
+    )
+    parser.add_argument(
+        "--set",
+        type=_reader(config.parse_setting),
+        default=[],
+        action="append",
+        metavar="NAME=VALUE",
+        help="set a parameter; may be given again",
+    )
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="sitl",
+        description=__doc__,
+        epilog="'sitl COMMAND --help' explains each, with examples.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_Parser)
+
+    def command(name: str, short: str, long: str, examples: str) -> argparse.ArgumentParser:
+        return commands.add_parser(
+            name,
+            help=short,
+            description=long,
+            epilog=examples,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+            allow_abbrev=False,
+        )
+
+    run = command("run", _HELP_RUN, RUN, RUN_EXAMPLES)
+    _add_vehicle(run)
+    run.add_argument(
+        "--instance",
+        type=_reader(config.parse_instance),
+        default=0,
+        metavar="I",
+        help="its ports, system id and state folder (0)",
+    )
+    _add_simulation(run, "1")
+    run.add_argument(
+        "--home",
+        type=_reader(config.parse_home),
+        metavar="LAT,LON,ALT,HDG",
+        help="where it stands: degrees, metres above mean sea level, degrees from north",
+    )
+    run.add_argument(
+        "--identity",
+        choices=("px4", "generic"),
+        default="px4",
+        help="autopilot that it reports (px4): ground stations know px4's modes; generic claims none",
+    )
+    run.add_argument(
+        "--gcs",
+        type=_reader(config.parse_peer),
+        default=[],
+        action="append",
+        metavar="HOST:PORT",
+        help="another ground station to serve from the start; may be given again",
+    )
+    run.add_argument(
+        "--listen",
+        type=_reader(config.parse_listen),
+        default=config.LOOPBACK,
+        metavar="ADDRESS",
+        help="where the UDP ports listen (127.0.0.1); 0.0.0.0 lets everyone on the network command the vehicle",
+    )
+    run.add_argument(
+        "--state-dir",
+        type=Path,
+        metavar="DIR",
+        help="parameters and plan are kept here ($XDG_STATE_HOME or ~/.local/state, yawsitter/instance-I)",
+    )
+    run.add_argument("--no-zenoh", action="store_true", help="no Zenoh telemetry")
+    run.add_argument(
+        "--zenoh-endpoint",
+        metavar="ENDPOINT",
+        help="where Zenoh listens (tcp/127.0.0.1:7447+I)",
+    )
+    run.add_argument("--record", type=Path, metavar="DIR", help="keep every MAVLink frame in DIR, as a new .tlog")
+    run.add_argument("--verbose", action="store_true", help="log more")
+
+    fly = command("fly", _HELP_FLY, FLY, FLY_EXAMPLES)
+    fly.add_argument("mission", type=Path, metavar="MISSION", help="a mission (.yaml) or QGroundControl plan (.plan)")
+    _add_vehicle(fly)
+    _add_simulation(fly, "max")
+    fly.add_argument("--out", type=Path, metavar="DIR", help="write the flight's logs and figures here")
+    fly.add_argument("--json", action="store_true", help="print one JSON object")
+
+    trim = command("trim", _HELP_TRIM, TRIM, TRIM_EXAMPLES)
+    _add_vehicle(trim)
+    trim.add_argument(
+        "--airspeed", type=_reader(_airspeed), default=0.0, metavar="M_S", help="of level flight, m/s (0: hover)"
+    )
+    trim.add_argument("--json", action="store_true", help="print one JSON object")
+    return parser
+
+
+def _run(args: argparse.Namespace) -> int:
+    from sitl.daemon import main as daemon
+
+    settings = config.RunConfig(
+        vehicle=args.vehicle,
+        instance=args.instance,
+        speed=args.speed,
+        home=args.home,
+        wind_N_m_s=args.wind,
+        gust_m_s=args.gust,
+        seed=args.seed,
+        identity=args.identity,
+        ground_stations=tuple(args.gcs),
+        settings=tuple(args.set),
+        state_dir=args.state_dir,
+        zenoh_endpoint=args.zenoh_endpoint,
+        zenoh=not args.no_zenoh,
+        record_dir=args.record,
+        listen=args.listen,
+    )
+    return daemon.main(settings, verbose=args.verbose)
+
+
+def _fly(args: argparse.Namespace) -> int:
+    from gcs_tools import lockstep
+
+    return int(lockstep.main(args) or 0)
+
+
+def _trim(args: argparse.Namespace) -> int:
+    from sitl.model import trim
+    from sitl.vehicle_spec import load_vehicle
+
+    return trim.main(args, load_vehicle(args.vehicle).airframe.airframe)
+
+
+def _is_mistake(error: ValueError) -> bool:
+    """Whether the person at the keyboard can mend it; files that can't be used say so with a ConfigError."""
+    from sitl.strict_yaml import ConfigError
+
+    return isinstance(error, config.SettingError | ConfigError)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    args = _parser().parse_args(argv)
+    commands = {"run": _run, "fly": _fly, "trim": _trim}
+    try:
+        return commands[args.command](args)
+    except ValueError as error:
+        if not _is_mistake(error):
+            raise
+        print(f"sitl {args.command}: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main())

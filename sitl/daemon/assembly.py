@@ -1,0 +1,111 @@
+"""The parts behind the sockets put together. Heavy to import: numba and the kernels come with it."""
+
+import gc
+from collections.abc import Callable
+from typing import Any
+
+from sitl.daemon.boot import Boot
+from sitl.daemon.config import RunConfig, SettingError
+from sitl.daemon.loop import Loop
+from sitl.daemon.recorder import Recorder
+from sitl.daemon.udp import Sockets
+from sitl.mavlink.endpoint import Endpoint
+from sitl.mavlink.identity import Identity
+from sitl.mavlink.peers import PortKind
+from sitl.onboard.store import FolderStore
+from sitl.strict_yaml import ConfigError
+from sitl.telemetry import keys
+from sitl.telemetry.feed import Feed
+from sitl.telemetry.publisher import Publisher, ZenohUnavailableError, default_endpoint, open_session
+from sitl.vehicle import DEFAULT_HOME, Vehicle, load_vehicle
+
+
+def build_vehicle(config: RunConfig) -> Vehicle:
+    """The vehicle of the settings, with its kernels compiled. Raises SettingError."""
+    assert config.state_dir is not None
+    home = config.home
+    try:
+        return Vehicle(
+            load_vehicle(config.vehicle),
+            home=home.point if home else DEFAULT_HOME,
+            heading_rad=home.heading_rad if home else 0.0,
+            seed=config.seed,
+            wind_N=config.wind_N_m_s,
+            gust_m_s=config.gust_m_s,
+            store=FolderStore(config.state_dir),
+            overrides={"SIM_SPEED": config.speed, **dict(config.settings)},
+        )
+    except ConfigError as error:
+        raise SettingError(str(error)) from None
+
+
+def build_endpoint(config: RunConfig, vehicle: Vehicle) -> Endpoint:
+    peers = [(PortKind.GCS, address) for address in config.gcs_peers]
+    peers += [(PortKind.ONBOARD, address) for address in config.onboard_peers]
+    return Endpoint(vehicle, identity=Identity(config.identity), system_id=config.system_id, static_peers=peers)
+
+
+def open_publisher(config: RunConfig) -> Publisher | None:
+    """Zenoh telemetry, if it is wanted. Raises SettingError."""
+    if not config.zenoh:
+        return None
+    try:
+        return Publisher(open_session(zenoh_endpoint(config)), config.instance)
+    except ZenohUnavailableError as error:
+        raise SettingError(f"{error}; choose another address with --zenoh-endpoint, or --no-zenoh") from None
+
+
+def zenoh_endpoint(config: RunConfig) -> str:
+    return config.zenoh_endpoint or default_endpoint(config.instance)
+
+
+def build_loop(
+    config: RunConfig,
+    vehicle: Vehicle,
+    sockets: Sockets,
+    publisher: Publisher | None,
+    recorder: Recorder | None,
+    clock: Callable[[], float],
+) -> tuple[Loop, Endpoint]:
+    """The loop with everything attached, and each function in it run once so that none compiles in flight."""
+    endpoint = build_endpoint(config, vehicle)
+    loop = Loop(vehicle, endpoint, sockets, clock, publisher=publisher, recorder=recorder)
+    feed = Feed(vehicle, config.instance, loop.figures)
+    for topic in keys.TOPICS:
+        if topic.queryable:
+            feed.latest(topic)
+    if publisher is not None:
+        loop.feed_from(feed)
+        publisher.attach(feed)
+    return loop, endpoint
+
+
+def introduce(endpoint: Endpoint, boot: Boot, wall_s: float) -> None:
+    """Let the endpoint learn whom the boot phase heard."""
+    for (port, address), data in boot.heard.items():
+        endpoint.receive(data, address, PortKind(port.value), wall_s)
+
+
+def settle_garbage() -> None:
+    """Take what was built so far out of the garbage collector's rounds: a full one would hold the loop up for 20 ms."""
+    gc.collect()
+    gc.freeze()
+
+
+def banner(config: RunConfig, vehicle: Vehicle, publisher: Publisher | None, recorder: Recorder | None) -> str:
+    def target(addresses: tuple[Any, ...]) -> str:
+        return ", ".join(f"{host}:{port}" for host, port in addresses)
+
+    speed = f"{config.speed:g} x real time" if config.speed else "as fast as possible"
+    lines = [
+        f"vehicle {vehicle.spec.name}, instance {config.instance}, system id {config.system_id}, {speed}",
+        f"  ground stations  UDP {config.listen}:{config.local_gcs[1]} -> {target(config.gcs_peers)}",
+        f"  onboard          UDP {config.listen}:{config.local_onboard[1]} -> {target(config.onboard_peers)}",
+        f"  Zenoh            {zenoh_endpoint(config)}, keys yawsitter/{config.instance}/..."
+        if publisher
+        else "  Zenoh            off",
+        f"  state            {config.state_dir}",
+    ]
+    if recorder is not None:
+        lines.append(f"  recording        {recorder.path}")
+    return "\n".join(lines)

@@ -1,0 +1,53 @@
+"""The seconds before the vehicle is there: heartbeats that say MAV_STATE_BOOT while its kernels load or compile.
+
+Light on purpose: nothing here may import numpy, numba or the vehicle, so that the first HEARTBEAT leaves within a
+fraction of a second. Requests that arrive meanwhile are not kept, since acting on them seconds later would surprise
+whoever sent them; clients repeat them.
+"""
+
+from collections.abc import Iterable
+
+from sitl.daemon.config import Address
+from sitl.daemon.udp import Port, Sockets
+from sitl.mavlink.codec import Encoder
+from sitl.mavlink.identity import COMPONENT_ID, Identity, boot_heartbeat
+
+HEARTBEAT_S = 1.0
+HEARD_MAX = 16
+_HEARTBEAT_BYTES = 21  # header 10, payload 9, checksum 2
+
+
+def is_lone_heartbeat(data: bytes) -> bool:
+    """Whether a datagram is one MAVLink 2 HEARTBEAT and nothing else."""
+    return len(data) == _HEARTBEAT_BYTES and data[0] == 0xFD and data[7:10] == b"\0\0\0"
+
+
+class Boot:
+    """Heartbeats to the static peers and to whoever has written."""
+
+    def __init__(
+        self, sockets: Sockets, identity: Identity, system_id: int, peers: Iterable[tuple[Port, Address]]
+    ) -> None:
+        self.heard: dict[tuple[Port, Address], bytes] = {}  # the last lone HEARTBEAT of each, for the vehicle to learn
+        self._sockets = sockets
+        self._message = boot_heartbeat(identity)
+        self._system_id = system_id
+        self._encoders = {peer: Encoder(system_id, COMPONENT_ID) for peer in peers}
+        self._due_s = float("-inf")
+
+    def turn(self, wall_s: float) -> None:
+        """Read what is there; heartbeat to everyone when it is time, and at once to a newcomer."""
+        for port, address, data in self._sockets.receive():
+            if not is_lone_heartbeat(data) or len(self.heard) >= HEARD_MAX:
+                continue
+            self.heard[port, address] = data
+            if (port, address) not in self._encoders:
+                self._encoders[port, address] = Encoder(self._system_id, COMPONENT_ID)
+                self._send((port, address))
+        if wall_s >= self._due_s:
+            self._due_s = wall_s + HEARTBEAT_S
+            for peer in self._encoders:
+                self._send(peer)
+
+    def _send(self, peer: tuple[Port, Address]) -> None:
+        self._sockets.send(*peer, self._encoders[peer].encode(self._message))

@@ -1,0 +1,187 @@
+"""The settings of one daemon, and how the command line's values are read into them. No heavy imports."""
+
+import ipaddress
+import math
+import os
+import socket
+from pathlib import Path
+from typing import NamedTuple
+
+from sitl.geodesy import GeoPoint
+
+INSTANCE_MAX = 249  # system id = instance + 1, and MAVLink's end at 255 with 251..255 for ground stations
+GCS_PORT = 18570  # local ports of instance 0, and the peers they serve from the start
+GCS_PEER_PORT = 14550
+ONBOARD_PORT = 14580
+ONBOARD_PEER_PORT = 14540
+LOOPBACK = "127.0.0.1"
+WIND_MAX_M_S = 30.0
+GUST_MAX_M_S = 10.0
+SPEED_MAX = 1000.0
+
+Address = tuple[str, int]
+
+
+class SettingError(ValueError):
+    """A setting that can't be used; the message is one line for the person at the keyboard."""
+
+
+class Home(NamedTuple):
+    point: GeoPoint
+    heading_rad: float
+
+
+class RunConfig(NamedTuple):
+    vehicle: str = "yawsitter"
+    instance: int = 0
+    speed: float = 1.0  # 0: as fast as possible
+    home: Home | None = None  # None: the vehicle's own default
+    wind_N_m_s: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    gust_m_s: float = 0.0
+    seed: int = 1
+    identity: str = "px4"
+    ground_stations: tuple[Address, ...] = ()
+    settings: tuple[tuple[str, float], ...] = ()
+    state_dir: Path | None = None  # None: default_state_dir
+    zenoh_endpoint: str | None = None  # None: the instance's own loopback port
+    zenoh: bool = True
+    record_dir: Path | None = None
+    listen: str = LOOPBACK
+
+    @property
+    def system_id(self) -> int:
+        return self.instance + 1
+
+    @property
+    def local_gcs(self) -> Address:
+        return self.listen, GCS_PORT + self.instance
+
+    @property
+    def local_onboard(self) -> Address:
+        return self.listen, ONBOARD_PORT + self.instance
+
+    @property
+    def gcs_peers(self) -> tuple[Address, ...]:
+        """Ground stations that are served whether or not they were heard."""
+        return tuple(dict.fromkeys(((LOOPBACK, GCS_PEER_PORT), *self.ground_stations)))
+
+    @property
+    def onboard_peers(self) -> tuple[Address, ...]:
+        return ((LOOPBACK, ONBOARD_PEER_PORT + self.instance),)
+
+
+def default_state_dir(instance: int) -> Path:
+    base = os.environ.get("XDG_STATE_HOME")
+    return (Path(base) if base else Path.home() / ".local" / "state") / "yawsitter" / f"instance-{instance}"
+
+
+def _numbers(text: str, names: str) -> list[float]:
+    """The finite numbers of a comma-separated list with as many members as `names` has."""
+    count = names.count(",") + 1
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) != count or not all(math.isfinite(v) for v in values):
+        raise SettingError(f"'{text}' is not {names} ({count} numbers with commas between)")
+    return values
+
+
+def _within(value: float, low: float, high: float, what: str) -> float:
+    if not low <= value <= high:
+        raise SettingError(f"{what} {value:g} is outside {low:g} to {high:g}")
+    return value
+
+
+def parse_home(text: str) -> Home:
+    lat, lon, alt, heading = _numbers(text, "LAT,LON,ALT_AMSL,HEADING")
+    _within(lat, -90.0, 90.0, "latitude")
+    _within(lon, -180.0, 180.0, "longitude")
+    _within(alt, -500.0, 9000.0, "altitude")
+    _within(heading, -360.0, 360.0, "heading")
+    return Home(GeoPoint(lat, lon, alt), math.radians(heading))
+
+
+def parse_wind(text: str) -> tuple[float, float, float]:
+    north, east, down = (
+        _within(v, -WIND_MAX_M_S, WIND_MAX_M_S, "wind component") for v in _numbers(text, "NORTH,EAST,DOWN")
+    )
+    return north, east, down
+
+
+def parse_gust(text: str) -> float:
+    (gust,) = _numbers(text, "M_S")
+    return _within(gust, 0.0, GUST_MAX_M_S, "gust")
+
+
+def parse_speed(text: str) -> float:
+    """A factor of real time; 'max' reads as 0, which is how the parameter SIM_SPEED spells it."""
+    if text == "max":
+        return 0.0
+    try:
+        speed = float(text)
+    except ValueError:
+        speed = 0.0
+    if not 0.0 < speed <= SPEED_MAX:
+        raise SettingError(f"'{text}' is neither a factor above 0 and up to {SPEED_MAX:g} nor 'max'")
+    return speed
+
+
+def parse_instance(text: str) -> int:
+    try:
+        instance = int(text)
+    except ValueError:
+        instance = -1
+    if not 0 <= instance <= INSTANCE_MAX:
+        raise SettingError(f"'{text}' is not a whole number from 0 to {INSTANCE_MAX}")
+    return instance
+
+
+def parse_seed(text: str) -> int:
+    try:
+        seed = int(text)
+    except ValueError:
+        seed = -1
+    if not 0 <= seed < 2**32:
+        raise SettingError(f"'{text}' is not a whole number from 0 to {2**32 - 1}")
+    return seed
+
+
+def parse_setting(text: str) -> tuple[str, float]:
+    name, separator, value = text.partition("=")
+    try:
+        number = float(value)
+    except ValueError:
+        number = math.nan
+    if not name or not separator or not math.isfinite(number):
+        raise SettingError(f"'{text}' is not NAME=VALUE with a number as value (for example RATE_Y_P=0.4)")
+    return name.strip().upper(), number
+
+
+def parse_peer(text: str) -> Address:
+    host, separator, port = text.rpartition(":")
+    if not separator or not host or not port.isdecimal() or not 0 < int(port) < 65536:
+        raise SettingError(f"'{text}' is not HOST:PORT (for example 192.168.1.20:14550)")
+    try:
+        found = socket.getaddrinfo(host, int(port), socket.AF_INET, socket.SOCK_DGRAM)
+    except OSError:
+        raise SettingError(f"'{host}' is no IPv4 address and no name that resolves to one") from None
+    return str(found[0][4][0]), int(port)
+
+
+def parse_listen(text: str) -> str:
+    try:
+        return str(ipaddress.IPv4Address(text))
+    except ValueError:
+        raise SettingError(
+            f"'{text}' is not an IPv4 address (127.0.0.1 this machine only, 0.0.0.0 every network)"
+        ) from None
+
+
+def check(config: RunConfig) -> RunConfig:
+    """Raise SettingError for settings that are right each by itself but not together."""
+    if ipaddress.IPv4Address(config.listen).is_loopback:
+        for host, port in config.ground_stations:
+            if not ipaddress.IPv4Address(host).is_loopback:
+                raise SettingError(f"--gcs {host}:{port} can't be reached from {config.listen}: add --listen 0.0.0.0")
+    return config

@@ -1,0 +1,155 @@
+"""`sitl run`: sockets and boot heartbeats first, then the vehicle, then the loop until the end."""
+
+import logging
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable
+from types import FrameType
+from typing import TYPE_CHECKING, Any
+
+from sitl.daemon import config as settings
+from sitl.daemon.boot import Boot
+from sitl.daemon.config import RunConfig, SettingError
+from sitl.daemon.recorder import Recorder
+from sitl.daemon.udp import Port, Sockets
+from sitl.mavlink.identity import Identity
+
+if TYPE_CHECKING:
+    from sitl.telemetry.publisher import Publisher
+    from sitl.vehicle import Vehicle
+
+log = logging.getLogger("sitl")
+
+BOOT_TURN_S = 0.02
+
+
+def wall_clock() -> Callable[[], float]:
+    """Seconds since 1970 as they were at start, from then on by the monotonic clock: they never jump."""
+    offset_s = time.time() - time.monotonic()
+    monotonic = time.monotonic
+    return lambda: offset_s + monotonic()
+
+
+class Stop:
+    """Set by Ctrl-C and SIGTERM; a second Ctrl-C ends the process the hard way."""
+
+    def __init__(self) -> None:
+        self.requested = False
+        signal.signal(signal.SIGINT, self._request)
+        signal.signal(signal.SIGTERM, self._request)
+
+    def _request(self, number: int, _: FrameType | None) -> None:
+        if self.requested:
+            signal.signal(number, signal.SIG_DFL)
+        self.requested = True
+
+    def __call__(self) -> bool:
+        return self.requested
+
+
+class Construction(threading.Thread):
+    """Imports and builds the vehicle while the main thread keeps up the heartbeats."""
+
+    def __init__(self, config: RunConfig) -> None:
+        super().__init__(name="construction", daemon=True)
+        self.vehicle: Vehicle | None = None
+        self.publisher: Publisher | None = None
+        self.failure: BaseException | None = None
+        self._config = config
+
+    def run(self) -> None:
+        try:
+            from sitl.daemon import assembly
+
+            self.publisher = assembly.open_publisher(self._config)
+            self.vehicle = assembly.build_vehicle(self._config)
+        except BaseException as failure:
+            self.failure = failure
+
+
+def _writable(folder: Any) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SettingError(f"--state-dir {folder}: {error.strerror}") from None
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise SettingError(f"--state-dir {folder}: not writable")
+
+
+def main(config: RunConfig, verbose: bool = False) -> int:
+    """Run until told to stop; returns the exit status. Raises SettingError for settings that can't be used."""
+    logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", level=logging.INFO, stream=sys.stderr)
+    if verbose:
+        log.setLevel(logging.DEBUG)
+    config = settings.check(config)._replace(state_dir=config.state_dir or settings.default_state_dir(config.instance))
+    stop = Stop()
+    clock = wall_clock()
+    sockets = Sockets({Port.GCS: config.local_gcs, Port.ONBOARD: config.local_onboard}, config.instance)
+    peers = [(Port.GCS, address) for address in config.gcs_peers]
+    peers += [(Port.ONBOARD, address) for address in config.onboard_peers]
+    boot = Boot(sockets, Identity(config.identity), config.system_id, peers)
+    boot.turn(clock())
+    recorder = None
+    construction = Construction(config)
+    try:
+        _writable(config.state_dir)
+        if config.record_dir is not None:
+            recorder = Recorder(config.record_dir, config.instance, clock())
+        construction.start()
+        while construction.is_alive() and not stop():
+            boot.turn(clock())
+            sockets.wait(BOOT_TURN_S)
+        if construction.is_alive():
+            # no orderly way out of a thread that compiles; nothing is written yet
+            logging.shutdown()
+            os._exit(0)
+        if construction.failure is not None:
+            raise construction.failure
+        assert construction.vehicle is not None
+        _fly(config, construction.vehicle, construction.publisher, sockets, recorder, boot, stop, clock)
+    finally:
+        if construction.publisher is not None:
+            construction.publisher.close()
+        if recorder is not None:
+            recorder.close()
+        sockets.close()
+    return 0
+
+
+def _fly(
+    config: RunConfig,
+    vehicle: "Vehicle",
+    publisher: "Publisher | None",
+    sockets: Sockets,
+    recorder: Recorder | None,
+    boot: Boot,
+    stop: Stop,
+    clock: Callable[[], float],
+) -> None:
+    """The loop, again for each reboot, until it ends."""
+    from sitl.daemon import assembly
+    from sitl.daemon.loop import Ending
+
+    log.info("%s", assembly.banner(config, vehicle, publisher, recorder))
+    while True:
+        loop, endpoint = assembly.build_loop(config, vehicle, sockets, publisher, recorder, clock)
+        assembly.introduce(endpoint, boot, clock())
+        boot.heard.clear()
+        assembly.settle_garbage()
+        ending = loop.run(stop)
+        figures = loop.figures()
+        log.info(
+            "%s after %.1f s simulated; %d turns, %d late by more than one, the worst by %.1f ms, %d faults",
+            ending.value,
+            figures.now_us * 1e-6,
+            figures.turns,
+            figures.overruns,
+            figures.worst_late_ms,
+            figures.faults,
+        )
+        if ending is not Ending.REBOOT:
+            return
+        vehicle = assembly.build_vehicle(config)

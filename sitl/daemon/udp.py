@@ -1,0 +1,88 @@
+"""The two UDP sockets of a vehicle: one for ground stations, one for onboard computers. Never blocks but in `wait`."""
+
+import contextlib
+import errno
+import select
+import socket
+from collections.abc import Iterator, Mapping
+from enum import Enum
+
+from sitl.daemon.config import Address, SettingError
+
+DATAGRAMS_AT_ONCE = 32  # per socket; the loop looks at its deadline before it takes more
+_BUFFER_BYTES = 1 << 20
+_DATAGRAM_BYTES = 65535
+
+
+class Port(Enum):
+    """Whom a socket is for; the values are those of the link's PortKind, which this module is too light to import."""
+
+    GCS = "gcs"
+    ONBOARD = "onboard"
+
+
+class Sockets:
+    """Bound sockets, each under whom it is for."""
+
+    def __init__(self, addresses: Mapping[Port, Address], instance: int) -> None:
+        self.received = 0
+        self.sent = 0
+        self.dropped = 0  # datagrams that the system would not take
+        self._sockets: dict[Port, socket.socket] = {}
+        try:
+            for port, address in addresses.items():
+                self._sockets[port] = _bound(address, instance)
+        except SettingError:
+            self.close()
+            raise
+        self._readable = list(self._sockets.values())
+
+    def wait(self, timeout_s: float) -> bool:
+        """Sleep until a datagram is there (True) or the time is over (False)."""
+        return bool(select.select(self._readable, (), (), max(0.0, timeout_s))[0])
+
+    def receive(self) -> Iterator[tuple[Port, Address, bytes]]:
+        """What has come in, without waiting."""
+        for port, sock in self._sockets.items():
+            for _ in range(DATAGRAMS_AT_ONCE):
+                try:
+                    data, address = sock.recvfrom(_DATAGRAM_BYTES)
+                except BlockingIOError:
+                    break
+                except OSError:
+                    continue  # Windows reports a peer's closed port here; nothing was received
+                self.received += 1
+                yield port, address, data
+
+    def send(self, port: Port, address: Address, data: bytes) -> None:
+        """Hand a datagram to the system; one that it refuses is counted and forgotten, as on any UDP link."""
+        try:
+            self._sockets[port].sendto(data, address)
+            self.sent += 1
+        except OSError:
+            self.dropped += 1
+
+    def close(self) -> None:
+        for sock in self._sockets.values():
+            with contextlib.suppress(OSError):
+                sock.close()
+
+
+def _bound(address: Address, instance: int) -> socket.socket:
+    host, port = address
+    sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        sock.setblocking(False)
+        with contextlib.suppress(OSError):
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER_BYTES)
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _BUFFER_BYTES)
+        sock.bind(address)
+    except OSError as error:
+        sock.close()
+        if error.errno == errno.EADDRINUSE:
+            raise SettingError(
+                f"UDP port {port} on {host} is in use: is instance {instance} running already? "
+                f"Choose another with --instance {instance + 1}"
+            ) from None
+        raise SettingError(f"can't listen on {host}:{port}: {error.strerror}") from None
+    return sock

@@ -1,0 +1,361 @@
+"""The messages: pure functions from the vehicle's snapshot to structures that encode as JSON.
+
+Every field says its unit; N is north-east-down, B the aeroplane's forward-right-down, quaternions are (w, x, y, z)
+and take B to N. Motion is the plant's truth; fields that begin with `nav_` are what the vehicle believes.
+"""
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any, Protocol
+
+import msgspec
+
+from sitl.frames import heading, quaternion_to_yxz
+from sitl.geodesy import to_global
+from sitl.onboard.modes import Event
+from sitl.telemetry.keys import TOPICS
+
+if TYPE_CHECKING:
+    from sitl.onboard.parameters import Parameters
+    from sitl.snapshot import Snapshot
+
+VERSION = 1  # of the schema: goes up when a field changes its meaning or goes away, not when one is added
+
+Triple = tuple[float, float, float]
+Quadruple = tuple[float, float, float, float]
+_RPM = 60.0 / (2.0 * math.pi)
+
+encode = msgspec.json.Encoder().encode
+
+
+class LoadLike(Protocol):
+    """A force [N] and moment [N m] in B about the centre of mass."""
+
+    @property
+    def force_B(self) -> Triple: ...
+    @property
+    def moment_B(self) -> Triple: ...
+
+
+class StateMessage(msgspec.Struct, frozen=True, gc=False):
+    now_us: int
+    lat_deg: float
+    lon_deg: float
+    alt_amsl_m: float
+    position_N_m: Triple
+    velocity_N_m_s: Triple
+    acceleration_N_m_s2: Triple
+    specific_force_B_m_s2: Triple
+    wind_N_m_s: Triple
+    feet_down: int
+    nav_position_N_m: Triple
+    nav_velocity_N_m_s: Triple
+
+
+class AttitudeMessage(msgspec.Struct, frozen=True, gc=False):
+    now_us: int
+    q_NB: Quadruple
+    phi_deg: float
+    theta_deg: float
+    psi_deg: float
+    heading_deg: float
+    rates_B_rad_s: Triple
+    nav_q_NB: Quadruple
+    nav_rates_B_rad_s: Triple
+
+
+class SetpointMessage(msgspec.Struct, frozen=True, gc=False):
+    now_us: int
+    position_N_m: Triple
+    velocity_N_m_s: Triple
+    acceleration_N_m_s2: Triple
+    heading_deg: float
+    heading_rate_deg_s: float
+    velocity_command_N_m_s: Triple
+    attitude_command_q_NB: Quadruple
+    phi_command_deg: float
+    theta_command_deg: float
+    psi_command_deg: float
+    rates_command_B_rad_s: Triple
+    saturated: bool
+
+
+class ActuatorsMessage(msgspec.Struct, frozen=True, gc=False):
+    now_us: int
+    thrust_left_command_N: float
+    thrust_right_command_N: float
+    flap_left_command_deg: float
+    flap_right_command_deg: float
+    rotor_left_rpm: float
+    rotor_right_rpm: float
+    flap_left_deg: float
+    flap_right_deg: float
+
+
+class LoadMessage(msgspec.Struct, frozen=True, gc=False):
+    force_B_N: Triple
+    moment_B_N_m: Triple
+
+
+class LoadsMessage(msgspec.Struct, frozen=True, gc=False):
+    now_us: int
+    causes: dict[str, LoadMessage]
+    total: LoadMessage
+
+
+class ModeMessage(msgspec.Struct, frozen=True, gc=False):
+    now_us: int
+    mode: str
+    armed: bool
+    landed: str
+    tipped_over: bool
+    failsafe: str
+    ready_to_arm: bool
+    mission_state: str
+    mission_current: int
+    mission_total: int
+    mission_plan_id: int
+    home_lat_deg: float
+    home_lon_deg: float
+    home_alt_amsl_m: float
+    home_N_m: Triple
+    home_heading_deg: float
+    origin_lat_deg: float
+    origin_lon_deg: float
+    origin_alt_amsl_m: float
+    speed_factor: float
+    paused: bool
+    battery_voltage_V: float
+    battery_current_A: float
+    battery_remaining: float
+
+
+class LoopMessage(msgspec.Struct, frozen=True, gc=False):
+    now_us: int
+    up_wall_s: float
+    real_time_factor: float
+    turns: int
+    overruns: int
+    worst_late_ms: float
+    slipped_s: float
+    datagrams_in: int
+    datagrams_out: int
+    datagrams_dropped: int
+    faults: int
+    telemetry_messages: int
+    telemetry_busy_ms: float
+    telemetry_worst_ms: float
+
+
+class EventMessage(msgspec.Struct, frozen=True, gc=False):
+    number: int
+    now_us: int
+    kind: str
+    severity: int
+    text: str
+    value: int
+
+
+class EventsMessage(msgspec.Struct, frozen=True):
+    next_number: int
+    events: list[EventMessage]
+
+
+class ParameterMessage(msgspec.Struct, frozen=True, gc=False):
+    name: str
+    value: float
+    default: float
+    minimum: float
+    maximum: float
+    unit: str
+    group: str
+    is_int: bool
+    read_only: bool
+    description: str
+    values: dict[str, str]
+
+
+class ParametersMessage(msgspec.Struct, frozen=True):
+    now_us: int
+    generation: int
+    parameters: list[ParameterMessage]
+
+
+def _yxz_deg(w: float, x: float, y: float, z: float) -> Triple:
+    phi, theta, psi = quaternion_to_yxz(w, x, y, z)
+    return math.degrees(phi), math.degrees(theta), math.degrees(psi)
+
+
+def state(s: "Snapshot") -> StateMessage:
+    t, n = s.truth, s.nav
+    lat_deg, lon_deg = to_global(s.origin, t.north_m, t.east_m)
+    return StateMessage(
+        now_us=s.now_us,
+        lat_deg=lat_deg,
+        lon_deg=lon_deg,
+        alt_amsl_m=s.origin.alt_amsl_m - t.down_m,
+        position_N_m=(t.north_m, t.east_m, t.down_m),
+        velocity_N_m_s=(t.v_north_m_s, t.v_east_m_s, t.v_down_m_s),
+        acceleration_N_m_s2=s.acceleration_N,
+        specific_force_B_m_s2=s.acceleration_B,
+        wind_N_m_s=s.wind_N,
+        feet_down=s.feet_down,
+        nav_position_N_m=(n.north_m, n.east_m, n.down_m),
+        nav_velocity_N_m_s=(n.v_north_m_s, n.v_east_m_s, n.v_down_m_s),
+    )
+
+
+def attitude(s: "Snapshot") -> AttitudeMessage:
+    t, n = s.truth, s.nav
+    phi_deg, theta_deg, psi_deg = _yxz_deg(t.qw, t.qx, t.qy, t.qz)
+    return AttitudeMessage(
+        now_us=s.now_us,
+        q_NB=(t.qw, t.qx, t.qy, t.qz),
+        phi_deg=phi_deg,
+        theta_deg=theta_deg,
+        psi_deg=psi_deg,
+        heading_deg=math.degrees(heading(t.qw, t.qx, t.qy, t.qz)),
+        rates_B_rad_s=(t.p_rad_s, t.q_rad_s, t.r_rad_s),
+        nav_q_NB=(n.qw, n.qx, n.qy, n.qz),
+        nav_rates_B_rad_s=(n.p_rad_s, n.q_rad_s, n.r_rad_s),
+    )
+
+
+def setpoint(s: "Snapshot") -> SetpointMessage:
+    r, c = s.reference, s.command
+    phi_deg, theta_deg, psi_deg = _yxz_deg(c.qw, c.qx, c.qy, c.qz)
+    return SetpointMessage(
+        now_us=s.now_us,
+        position_N_m=(r.north_m, r.east_m, r.down_m),
+        velocity_N_m_s=(r.v_north_m_s, r.v_east_m_s, r.v_down_m_s),
+        acceleration_N_m_s2=(r.a_north_m_s2, r.a_east_m_s2, r.a_down_m_s2),
+        heading_deg=math.degrees(r.heading_rad),
+        heading_rate_deg_s=math.degrees(r.heading_rate_rad_s),
+        velocity_command_N_m_s=(c.v_north_m_s, c.v_east_m_s, c.v_down_m_s),
+        attitude_command_q_NB=(c.qw, c.qx, c.qy, c.qz),
+        phi_command_deg=phi_deg,
+        theta_command_deg=theta_deg,
+        psi_command_deg=psi_deg,
+        rates_command_B_rad_s=(c.p_rad_s, c.q_rad_s, c.r_rad_s),
+        saturated=c.saturated > 0.0,
+    )
+
+
+def actuators(s: "Snapshot") -> ActuatorsMessage:
+    t, c = s.truth, s.command
+    return ActuatorsMessage(
+        now_us=s.now_us,
+        thrust_left_command_N=c.thrust_left_N,
+        thrust_right_command_N=c.thrust_right_N,
+        flap_left_command_deg=math.degrees(c.flap_left_rad),
+        flap_right_command_deg=math.degrees(c.flap_right_rad),
+        rotor_left_rpm=t.rotor_left_rad_s * _RPM,
+        rotor_right_rpm=t.rotor_right_rad_s * _RPM,
+        flap_left_deg=math.degrees(t.flap_left_rad),
+        flap_right_deg=math.degrees(t.flap_right_rad),
+    )
+
+
+def _total(parts: Iterable[Triple]) -> Triple:
+    x = y = z = 0.0
+    for part in parts:
+        x, y, z = x + part[0], y + part[1], z + part[2]
+    return x, y, z
+
+
+def loads(now_us: int, causes: Mapping[str, LoadLike]) -> LoadsMessage:
+    return LoadsMessage(
+        now_us=now_us,
+        causes={name: LoadMessage(load.force_B, load.moment_B) for name, load in causes.items()},
+        total=LoadMessage(
+            _total(load.force_B for load in causes.values()), _total(load.moment_B for load in causes.values())
+        ),
+    )
+
+
+def mode(s: "Snapshot", speed_factor: float, paused: bool) -> ModeMessage:
+    """`speed_factor` 0: as fast as possible."""
+    return ModeMessage(
+        now_us=s.now_us,
+        mode=s.mode.value,
+        armed=s.armed,
+        landed=s.landed.value,
+        tipped_over=s.tipped_over,
+        failsafe=s.failsafe,
+        ready_to_arm=s.ready_to_arm,
+        mission_state=s.mission_state.name.lower().replace("_", " "),
+        mission_current=s.mission_current,
+        mission_total=s.mission_total,
+        mission_plan_id=s.plan_id,
+        home_lat_deg=s.home.lat_deg,
+        home_lon_deg=s.home.lon_deg,
+        home_alt_amsl_m=s.home.alt_amsl_m,
+        home_N_m=s.home_N,
+        home_heading_deg=math.degrees(s.home_heading_rad),
+        origin_lat_deg=s.origin.lat_deg,
+        origin_lon_deg=s.origin.lon_deg,
+        origin_alt_amsl_m=s.origin.alt_amsl_m,
+        speed_factor=speed_factor,
+        paused=paused,
+        battery_voltage_V=s.battery.voltage_V,
+        battery_current_A=s.battery.current_A,
+        battery_remaining=s.battery.remaining,
+    )
+
+
+def mode_trigger(s: "Snapshot") -> tuple[Any, ...]:
+    """What in a snapshot makes the mode message go out at once when it changes."""
+    return (
+        s.mode,
+        s.armed,
+        s.landed,
+        s.tipped_over,
+        s.failsafe,
+        s.ready_to_arm,
+        s.mission_state,
+        s.mission_current,
+        s.plan_id,
+        s.home,
+    )
+
+
+def event(e: Event) -> EventMessage:
+    return EventMessage(e.number, e.now_us, e.kind.value, int(e.severity), e.text, e.value)
+
+
+def events(next_number: int, log: Iterable[Event]) -> EventsMessage:
+    return EventsMessage(next_number, [event(e) for e in log])
+
+
+def parameters(now_us: int, p: "Parameters") -> ParametersMessage:
+    entries = []
+    for name in p.names:
+        d = p.declaration(name)
+        entries.append(
+            ParameterMessage(
+                name=name,
+                value=p[name],
+                default=d.default,
+                minimum=d.minimum,
+                maximum=d.maximum,
+                unit=d.unit,
+                group=d.group,
+                is_int=d.is_int,
+                read_only=d.read_only,
+                description=d.long or d.short,
+                values={str(number): meaning for number, meaning in d.values},
+            )
+        )
+    return ParametersMessage(now_us, p.generation, entries)
+
+
+def description(vehicle: Mapping[str, Any], instance: int, rate_Hz: float) -> dict[str, Any]:
+    """The vehicle's own description together with what can be heard of it."""
+    topics = {t.name: {"cadence": t.cadence.value, "encoding": t.encoding, "queryable": t.queryable} for t in TOPICS}
+    return {
+        "schema_version": VERSION,
+        "instance": instance,
+        "rate_Hz": rate_Hz,
+        "topics": topics,
+        "vehicle": dict(vehicle),
+    }

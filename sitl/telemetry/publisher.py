@@ -1,0 +1,137 @@
+"""The Zenoh edge: sends what the feed says, answers queries, holds the liveliness token.
+
+All of it runs inside the loop's turn. A put takes about a microsecond and never waits: congestion control is DROP
+with no grace time, so a full queue behind a slow, stopped or dead subscriber costs the subscriber its messages only.
+Queries wait in a ring that the loop empties; no Python runs on Zenoh's threads.
+"""
+
+import logging
+import time
+from collections.abc import Callable
+from typing import Any
+
+import zenoh
+
+from sitl.telemetry import keys
+from sitl.telemetry.feed import Feed
+from sitl.telemetry.keys import Topic
+
+log = logging.getLogger(__name__)
+
+DEFAULT_PORT = 7447
+QUERIES_PER_TURN = 8
+QUERIES_WAITING = 64
+QUIET_S = 1.0  # between two reports of the same kind of fault
+
+
+class ZenohUnavailableError(Exception):
+    """The session could not be opened; the message is one line."""
+
+
+def default_endpoint(instance: int) -> str:
+    return f"tcp/127.0.0.1:{DEFAULT_PORT + instance}"
+
+
+def open_session(endpoint: str) -> Any:
+    """A session that listens on `endpoint` and looks for nobody else by itself."""
+    config = zenoh.Config()
+    for name, value in (
+        ("mode", '"peer"'),
+        ("listen/endpoints", f'["{endpoint}"]'),
+        ("scouting/multicast/enabled", "false"),
+        ("scouting/gossip/enabled", "false"),
+        # by default a put waits a millisecond for room before it drops
+        ("transport/link/tx/queue/congestion_control/drop/wait_before_drop", "0"),
+    ):
+        try:
+            config.insert_json5(name, value)
+        except zenoh.ZError:
+            raise ZenohUnavailableError(f"'{endpoint}' is no Zenoh endpoint (such as tcp/127.0.0.1:7447)") from None
+    try:
+        return zenoh.open(config)
+    except zenoh.ZError as error:
+        text = str(error)
+        reason = "the address is in use" if "in use" in text else text.partition(" at /")[0]
+        raise ZenohUnavailableError(f"Zenoh can't listen on {endpoint}: {reason}") from None
+
+
+class Publisher:
+    """One vehicle's telemetry on an open session, which it closes."""
+
+    def __init__(self, session: Any, instance: int, clock: Callable[[], float] = time.perf_counter) -> None:
+        self.messages = 0
+        self.busy_s = 0.0  # spent in `turn` in all
+        self.worst_s = 0.0  # longest `turn`
+        self.faults = 0
+        self._session = session
+        self._clock = clock
+        self._complained_s = float("-inf")
+        self._feed: Feed | None = None
+        self._publishers = {
+            topic: session.declare_publisher(
+                keys.key(instance, topic),
+                encoding=topic.encoding,
+                congestion_control=zenoh.CongestionControl.DROP,
+                priority=zenoh.Priority.DATA,
+            )
+            for topic in keys.TOPICS
+            if topic.cadence is not keys.Cadence.QUERY
+        }
+        self._answerable = {topic: zenoh.KeyExpr(keys.key(instance, topic)) for topic in keys.TOPICS if topic.queryable}
+        self._queries = session.declare_queryable(keys.all_keys(instance), zenoh.handlers.RingChannel(QUERIES_WAITING))
+        self._token = session.liveliness().declare_token(keys.alive_key(instance))
+
+    def attach(self, feed: Feed) -> None:
+        """Send this feed from now on."""
+        self._feed = feed
+
+    def turn(self, wall_s: float) -> None:
+        """Send what is due and answer what was asked. Never raises: telemetry must not stop a flight."""
+        if self._feed is None:
+            return
+        start = self._clock()
+        try:
+            for topic, payload in self._feed.due(wall_s, self._wanted):
+                self._publishers[topic].put(payload)
+                self.messages += 1
+            self._answer(self._feed)
+        except Exception:
+            self._complain(wall_s)
+        spent = self._clock() - start
+        self.busy_s += spent
+        if spent > self.worst_s:
+            self.worst_s = spent
+
+    def _wanted(self, topic: Topic) -> bool:
+        return bool(self._publishers[topic].matching_status.matching)
+
+    def _answer(self, feed: Feed) -> None:
+        for _ in range(QUERIES_PER_TURN):
+            query = self._queries.try_recv()
+            if query is None:
+                return
+            try:
+                for topic, key in self._answerable.items():
+                    if query.key_expr.intersects(key):
+                        query.reply(
+                            key,
+                            feed.latest(topic),
+                            encoding=topic.encoding,
+                            congestion_control=zenoh.CongestionControl.DROP,
+                        )
+            finally:
+                query.drop()  # tells the asker that there are no more replies
+
+    def _complain(self, wall_s: float) -> None:
+        self.faults += 1
+        if wall_s - self._complained_s >= QUIET_S:
+            self._complained_s = wall_s
+            log.exception("telemetry: fault %d", self.faults)
+
+    def close(self) -> None:
+        """Undeclare the token, so that listeners hear at once that the vehicle is gone, and close the session."""
+        try:
+            self._token.undeclare()
+            self._session.close()
+        except zenoh.ZError as error:
+            log.warning("Zenoh did not close cleanly: %s", error)
