@@ -31,12 +31,14 @@ def allocate(
     w: float,
     flow_left_N: float,
     flow_right_N: float,
+    flap_floor_N: float,
     floor_N: float,
 ) -> Allocation:
     """Thrusts [N] and flap angles [rad] that give `force_x` [N] along body x and `moment` [N·m].
 
     u, w: air velocity in B [m/s]. flow_*_N: each propeller's thrust as it shapes the slipstream now (the previous
-    command, not below the hover's: paper, below Eq. 11). floor_N: least total thrust.
+    command: paper, below Eq. 11). flap_floor_N: thrust of one propeller below which the flaps' pressure is not believed
+    to fall (hover's, as printed, keeps the flaps from overreacting). floor_N: least total thrust.
 
     T_L,R = (T ± ΔT)/2 with T = F_x − F_wing,x and ΔT = (M_z − M_wing,z) / l_y. The flaps take what is left of roll and
     pitch once the wing and the propellers' torque have had their part:
@@ -56,7 +58,8 @@ def allocate(
     torque = a.torque_coefficient / a.thrust_coefficient * difference
     pitch = (moment[1] - wing_m[1]) / (a.flap_area_m2 * a.chord_m * a.flap_moment_slope)
     roll = (moment[0] - wing_m[0] - torque) / (a.flap_area_m2 * a.flap_roll_arm_m * a.flap_lift_slope)
-    q_left, q_right = flap_pressure(a, w, wake_left), flap_pressure(a, w, wake_right)
+    q_left = flap_pressure(a, w, wake_speed(a, max(flow_left_N, flap_floor_N), u))
+    q_right = flap_pressure(a, w, wake_speed(a, max(flow_right_N, flap_floor_N), u))
     # the two flaps as a symmetric and a differential part, so that pitch can be served first
     flap_left, flap_right = (pitch + roll) / (2.0 * q_left), (pitch - roll) / (2.0 * q_right)
     m = a.flap_max_rad

@@ -19,7 +19,7 @@ from sitl.model.airframe import Airframe
 from sitl.navigation import NavState
 from sitl.quaternion import Quat, Vec3, rotate_back
 
-_LOOK_S = 0.01  # how far before and after now the reference is inverted for its attitude rates
+_LOOK_S = 0.02  # how far before and after now the reference is inverted for its attitude rates
 _POSITION_INTEGRAL_MAX = 5.0  # m s
 _VELOCITY_INTEGRAL_MAX = 10.0  # m
 _ANGLE_INTEGRAL_MAX = 1.0  # rad s
@@ -89,11 +89,14 @@ def _heading_frame(heading_rad: float, x: float, y: float, z: float) -> Vec3:
 
 @kernel
 def _reference_trim(a: Airframe, r: Reference, start: Trim, fresh_slope: bool) -> Trim:
-    """The trim that the reference's own velocity and acceleration need."""
+    """The trim that the reference's own velocity and acceleration need.
+
+    Two passes: the second difference of three such trims is taken, which would show what one pass leaves over.
+    """
     m = a.mass_kg
     force = _heading_frame(r.heading_rad, m * r.a_north_m_s2, m * r.a_east_m_s2, m * (r.a_down_m_s2 - GRAVITY_M_S2))
     air = _heading_frame(r.heading_rad, r.v_north_m_s, r.v_east_m_s, r.v_down_m_s)
-    return refined(a, force, air, 0.0, start, fresh_slope)
+    return refined(a, force, air, 0.0, refined(a, force, air, 0.0, start, fresh_slope), False)
 
 
 @kernel
@@ -213,22 +216,28 @@ def cascade(
     )
     force_N = (a.mass_kg * f[0], a.mass_kg * f[1], a.mass_kg * f[2])
 
-    # body rates that the reference itself needs: its trim now, a moment ago and a moment ahead
+    # body rates and moment that the reference itself needs: its trim now, a moment ago and a moment ahead
     now = _reference_trim(a, ref, m.reference_trim, True)
     rates_ff = (0.0, 0.0, 0.0)
+    moment_ff = (0.0, 0.0, 0.0)
     if s.feedforward_inverse > 0.0:
         before = _reference_trim(a, _carried(ref, -_LOOK_S), now, False)
         after = _reference_trim(a, _carried(ref, _LOOK_S), now, False)
         pitch_rate = (after.pitch_rad - before.pitch_rad) / (2.0 * _LOOK_S)
         lean_rate = (after.lean_rad - before.lean_rad) / (2.0 * _LOOK_S)
         rates_ff = rates_of(now.lean_rad, now.pitch_rad, ref.heading_rate_rad_s, pitch_rate, lean_rate)
+        moment_ff = (
+            0.0,
+            a.jyy_kg_m2 * (after.pitch_rad - 2.0 * now.pitch_rad + before.pitch_rad) / (_LOOK_S * _LOOK_S),
+            a.jzz_kg_m2 * (after.lean_rad - 2.0 * now.lean_rad + before.lean_rad) / (_LOOK_S * _LOOK_S),
+        )
 
     # pitch and lean: the attitude whose trim gives the wanted force at the present velocity
     trim = refined(
         a,
         _heading_frame(ref.heading_rad, force_N[0], force_N[1], force_N[2]),
         _heading_frame(ref.heading_rad, velocity[0], velocity[1], velocity[2]),
-        0.0,
+        moment_ff[1],
         m.command_trim,
         True,
     )
@@ -245,13 +254,12 @@ def cascade(
     rate_error = _difference(rate_target, rates)
     rate_integral = _integrated(m.rate_integral, rate_error, dt_s, _RATE_INTEGRAL_MAX, held)
     rate_smoothed, rate_error_rate = _filtered_rate(m.rate_error_smoothed, rate_error, dt_s, s.rate_d_tau_s)
-    demand = moment(gains.rate, rate_error, rate_integral, rate_error_rate)
+    demand = moment(gains.rate, rate_error, rate_integral, rate_error_rate, moment_ff)
 
     # allocation
     force_x = rotate_back(q_NB, force_N)[0]
     u, _, w = rotate_back(q_NB, velocity)
-    floor = 0.5 * s.slipstream_floor_N
-    x = allocate(a, force_x, demand, u, w, max(m.flow_left_N, floor), max(m.flow_right_N, floor), s.thrust_floor_N)
+    x = allocate(a, force_x, demand, u, w, m.flow_left_N, m.flow_right_N, 0.5 * s.slipstream_floor_N, s.thrust_floor_N)
     command = Command(
         target[0], target[1], target[2], target[3],
         rate_target[0], rate_target[1], rate_target[2],

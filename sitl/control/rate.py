@@ -7,10 +7,10 @@ from sitl.quaternion import Vec3
 
 
 @kernel
-def moment(g: Loop, error_B: Vec3, integral_B: Vec3, error_rate_B: Vec3) -> Vec3:
-    """M = K_p e + K_i ∫e + K_d ė  [N·m, B]."""
+def moment(g: Loop, error_B: Vec3, integral_B: Vec3, error_rate_B: Vec3, feedforward_B: Vec3) -> Vec3:
+    """M = K_p e + K_i ∫e + K_d ė + feed-forward [N·m, B]."""
     return (
-        pid(g.x, error_B[0], integral_B[0], error_rate_B[0]),
-        pid(g.y, error_B[1], integral_B[1], error_rate_B[1]),
-        pid(g.z, error_B[2], integral_B[2], error_rate_B[2]),
+        pid(g.x, error_B[0], integral_B[0], error_rate_B[0]) + feedforward_B[0],
+        pid(g.y, error_B[1], integral_B[1], error_rate_B[1]) + feedforward_B[1],
+        pid(g.z, error_B[2], integral_B[2], error_rate_B[2]) + feedforward_B[2],
     )
