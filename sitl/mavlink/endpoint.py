@@ -137,6 +137,7 @@ class Endpoint:
         self._stream_due_us = 0
 
     def _greet(self, peer: Peer) -> None:
+        self._link.send(peer, vehicle_heartbeat(self._link))
         text = f"{SIMULATOR} {'.'.join(map(str, version()))}: simulated '{self._vehicle.spec.name}'"
         self._link.tell(peer, Severity.INFO, text)
 
@@ -208,11 +209,7 @@ class Endpoint:
         for k in due:
             payload = payloads.get(k)
             if payload is None:
-                try:
-                    payload = STREAMS[k].payload(view)
-                except Exception:  # a number that fits no field: what a diverged simulation has to offer
-                    payload = b""
-                payloads[k] = payload
+                payload = payloads[k] = STREAMS[k].payload(view)
             if payload:
                 link.post(peer, STREAMS[k].definition, payload)
 
@@ -271,7 +268,9 @@ class Endpoint:
         """What normally flows slowly, at once."""
         view = self._link.view()
         for k in BY_ID[by_name(name).id]:
-            self._link.broadcast_packed(STREAMS[k].definition, STREAMS[k].payload(view))
+            payload = STREAMS[k].payload(view)
+            if payload:
+                self._link.broadcast_packed(STREAMS[k].definition, payload)
 
     _TELLERS: "dict[EventKind, Callable[[Endpoint, Event], None]]" = {  # noqa: RUF012
         EventKind.TEXT: _tell_text,

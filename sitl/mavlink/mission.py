@@ -258,11 +258,11 @@ class MissionService:
 
     @property
     def deadline_s(self) -> float:
-        """Wall time of the next repetition."""
-        pending = [download.sent_s for download in self._downloads.values()]
+        """Wall time of the next repetition or end."""
+        pending: list[Upload | Download] = list(self._downloads.values())
         if self._upload is not None:
-            pending.append(self._upload.sent_s)
-        return min(pending) + RETRY_S if pending else float("inf")
+            pending.append(self._upload)
+        return min((min(t.sent_s + RETRY_S, t.progress_s + GIVE_UP_S) for t in pending), default=float("inf"))
 
     def advance(self) -> None:
         """Repeat what got no answer, end what makes no progress."""

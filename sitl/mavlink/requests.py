@@ -40,9 +40,11 @@ def send_message(link: "Link", peer: "Peer", message_id: int, detail: float) -> 
     places = streams.BY_ID.get(message_id)
     if places is not None:
         view = link.view()
-        for k in places:
-            stream = streams.STREAMS[k]
-            link.send_packed(peer, stream.definition, stream.payload(view))
+        packed = [(streams.STREAMS[k].definition, streams.STREAMS[k].payload(view)) for k in places]
+        if not all(payload for _, payload in packed):
+            return False
+        for definition, payload in packed:
+            link.send_packed(peer, definition, payload)
         return True
     maker = _ONE_SHOT.get(message_id)
     replies = maker(link, peer, int(detail) if math.isfinite(detail) else 0) if maker else []

@@ -5,6 +5,7 @@ Streams run on simulation time. Default rates are those of PX4's SITL on its two
 """
 
 import heapq
+import struct
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -26,7 +27,11 @@ class Stream(NamedTuple):
     onboard_Hz: float
 
     def payload(self, view: View) -> bytes:
-        return self.definition.pack(*self.values(view))
+        """Empty where the values fit no field: what a simulation that has run away has to offer."""
+        try:
+            return self.definition.pack(*self.values(view))
+        except (struct.error, OverflowError, ValueError):
+            return b""
 
 
 def _stream(

@@ -76,13 +76,9 @@ def cm_s(metres_per_second: float) -> int:
 
 
 def cdeg(heading_rad: float) -> int:
-    """Heading in 0 … 35999."""
-    return round(math.degrees(heading_rad) * 100.0) % 36000 if math.isfinite(heading_rad) else UINT16_UNSET
-
-
-def degrees_from_degE7(value: int) -> float:
-    """Degrees; NaN where the field says unset."""
-    return value * 1e-7 if value != INT32_UNSET else NAN
+    """Heading in 0 … 35999, unset where it is no number."""
+    value = math.degrees(heading_rad) * 100.0
+    return round(value) % 36000 if math.isfinite(value) else UINT16_UNSET
 
 
 def float32(value: float) -> float:

@@ -161,3 +161,4 @@ def test_a_diverged_simulation_keeps_the_link_up(world: World) -> None:
     assert station.all("HEARTBEAT")
     assert station.all("SYS_STATUS")
     assert station.ask(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1) == [0]
+    assert station.ask(mav.MAV_CMD_REQUEST_MESSAGE, 32) == [DENIED]  # 1e300 m fit no float

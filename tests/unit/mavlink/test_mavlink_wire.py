@@ -75,8 +75,3 @@ def test_integers_travel_bytewise_in_a_float(value: int) -> None:
 def test_boot_stamps_are_unwrapped_to_the_time_nearest_now(offset_ms: int, now_us: int) -> None:
     wanted_ms = now_us // 1000 + offset_ms
     assert wire.boot_time_us(wanted_ms % 2**32, now_us) == wanted_ms * 1000
-
-
-def test_unset_coordinates_are_not_a_number() -> None:
-    assert math.isnan(wire.degrees_from_degE7(wire.INT32_UNSET))
-    assert wire.degrees_from_degE7(473977418) == pytest.approx(47.3977418)
