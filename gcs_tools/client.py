@@ -15,7 +15,8 @@ from sitl.mavlink.codec import mav
 T = TypeVar("T")
 Script = Generator[float, None, T]
 
-SYSTEM_ID = 252  # above every vehicle's, below those of the usual ground stations
+SYSTEM_ID = 252  # above every vehicle's, below that of the usual ground stations
+LAST_VEHICLE = 250
 COMPONENT_ID = mav.MAV_COMP_ID_MISSIONPLANNER
 HEARTBEAT_S = 1.0
 LOST_S = 3.0  # of silence, after which the vehicle counts as lost
@@ -105,10 +106,10 @@ class Client:
         return ours
 
     def _adopt(self, frame: codec.Frame) -> bool:
-        """Whether the frame is from a vehicle to settle on: the first autopilot that heartbeats."""
-        if self.system is not None or frame.name != "HEARTBEAT" or frame.component != _AUTOPILOT:
+        """Whether the frame is from a vehicle to settle on: the first autopilot heard."""
+        if self.system is not None or frame.component != _AUTOPILOT or frame.system > LAST_VEHICLE:
             return False
-        if frame.message.autopilot == mav.MAV_AUTOPILOT_INVALID:
+        if frame.name == "HEARTBEAT" and frame.message.autopilot == mav.MAV_AUTOPILOT_INVALID:
             return False
         self.system = frame.system
         return True
@@ -188,6 +189,8 @@ class Client:
         which = f"vehicle with system id {self.system}" if self.system else "vehicle"
         v = self.vehicle
         yield from self.wait(lambda: v.heard_s is not None, patience_s, f"no {which} heard in {patience_s:g} s")
+        if v.mode is None:
+            self.request("HEARTBEAT")  # sooner than the next one
         booting = (mav.MAV_STATE_UNINIT, mav.MAV_STATE_BOOT, mav.MAV_STATE_CALIBRATING)
         yield from self.wait(
             lambda: v.mode is not None and v.status not in booting, 30.0, "the vehicle doesn't finish booting"

@@ -11,7 +11,7 @@ with. Uploaded flights hand the items over, start the mission and watch.
 import math
 from typing import Any
 
-from gcs_tools.client import Client, LinkError, Script
+from gcs_tools.client import TRIES, Client, LinkError, Script
 from gcs_tools.metrics import Metrics, TooFewSamplesError, Track, evaluate
 from gcs_tools.plan import Plan, Streamed, Uploaded
 from gcs_tools.recording import Recording
@@ -21,6 +21,7 @@ from sitl.mavlink import codec
 from sitl.mavlink.codec import mav
 
 STREAM_S = 0.02  # of the vehicle's time between targets
+LISTEN_S = 2.0  # for the first sample of every stream
 LEAD_S = 0.5  # armed and standing, before the flight's time starts
 WARM_UP_S = 1.3  # of streaming before Offboard is asked for (the vehicle wants a second of it)
 ARMING_PATIENCE_S = 8.0
@@ -141,12 +142,7 @@ class Flight:
         self._note(f"vehicle {client.system} heard")
         self.phase = "configuring"
         intervals = dict.fromkeys(_UNWANTED, -1) | self._wanted
-        yield from client.set_intervals(intervals)
-        yield from client.wait(
-            lambda: v.position_m is not None and v.clock.known and v.ready is not None,
-            10.0,
-            "the vehicle tells no position, time or readiness",
-        )
+        yield from self._listen(intervals)
         if v.armed:
             raise LinkError("the vehicle is armed already; a flight starts disarmed and standing")
         self.phase = "preparing"
@@ -163,6 +159,22 @@ class Flight:
             client.background = None
             client.send_intervals(dict.fromkeys(intervals, 0))
         self.phase = "done"
+
+    def _listen(self, intervals: dict[str, int]) -> Script[None]:
+        """Have the streams at their rates and what a flight needs to know at hand."""
+        client, v = self.client, self.client.vehicle
+        for left in reversed(range(TRIES)):
+            yield from client.set_intervals(intervals)
+            try:
+                yield from client.wait(
+                    lambda: v.position_m is not None and v.clock.known and v.ready is not None,
+                    LISTEN_S,
+                    "the vehicle tells no position, time or readiness",
+                )
+                return
+            except LinkError:
+                if not left:
+                    raise
 
     def _streamed(self, plan: Streamed) -> Script[None]:
         client, v = self.client, self.client.vehicle

@@ -1,6 +1,7 @@
 """`gcs fly`: a plan flown over UDP by a vehicle that runs somewhere else."""
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 from gcs_tools import results
@@ -12,9 +13,15 @@ from gcs_tools.progress import Progress
 
 
 def fly(
-    plan: Plan, connection: Connection, *, system: int | None = None, out: Path | None = None, as_json: bool = False
+    plan: Plan,
+    connection: Connection,
+    *,
+    system: int | None = None,
+    out: Path | None = None,
+    as_json: bool = False,
+    check: Callable[[], None] = lambda: None,
 ) -> None:
-    """Fly, measure and tell the result.
+    """Fly, measure and tell the result. `check` is called often, to raise what else may have gone wrong.
 
     Raises LinkError when it wasn't flown to its end, OSError when `out` can't be written. A flight that ran its whole
     time is measured and told even if the landing behind it went wrong.
@@ -25,7 +32,12 @@ def fly(
     with UdpLink(connection) as link:
         try:
             with Progress(flight, quiet=as_json) as progress:
-                link.run(client, progress.update)
+
+                def each_turn(wall_s: float) -> None:
+                    check()
+                    progress.update(wall_s)
+
+                link.run(client, each_turn)
         except LinkError as error:
             fault = error
         except KeyboardInterrupt:

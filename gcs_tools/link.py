@@ -7,7 +7,7 @@ udpout:HOST:PORT    send there first
 import select
 import socket
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from types import TracebackType
 from typing import NamedTuple
 
@@ -110,10 +110,13 @@ class UdpLink:
             raise client.fault
 
 
-def free_udp_ports(*ports: int) -> bool:
+def free_ports(*, udp: Iterable[int], tcp: Iterable[int]) -> bool:
     """Whether all of these can be listened on at 127.0.0.1."""
-    for port in ports:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+    kinds = [(socket.SOCK_DGRAM, port) for port in udp] + [(socket.SOCK_STREAM, port) for port in tcp]
+    for kind, port in kinds:
+        with socket.socket(socket.AF_INET, kind) as probe:
+            if kind == socket.SOCK_STREAM:
+                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             try:
                 probe.bind(("127.0.0.1", port))
             except OSError:

@@ -41,9 +41,9 @@ def number_text(value: float) -> str:
     if isinstance(value, int):
         return str(value)
     for digits in range(1, 10):
-        text = f"{value:.{digits}g}"
-        if float32(float(text)) == float32(value):
-            return text
+        short = float(f"{value:.{digits}g}")
+        if float32(short) == float32(value):
+            return repr(short).removesuffix(".0")
     return repr(value)
 
 
@@ -89,15 +89,14 @@ def fetch_all(client: Client) -> Script[dict[str, Parameter]]:
                 break
         else:
             raise LinkError("the vehicle doesn't list its parameters")
-        for _ in range(TRIES):
-            missing = [k for k in range(box.count) if k not in box.indices]
-            if not missing:
-                break
+        fruitless = 0
+        while missing := [k for k in range(box.count) if k not in box.indices]:
+            if fruitless == TRIES:
+                raise LinkError(f"{len(missing)} of {box.count} parameters never came")
             for k in missing:
                 client.send(codec.message("PARAM_REQUEST_READ", param_index=k, **client.address()))
             yield from _quiet(client, box)
-        else:
-            raise LinkError(f"{len(missing)} of {box.count} parameters never came")
+            fruitless = fruitless + 1 if all(k not in box.indices for k in missing) else 0
         return dict(sorted(box.values.items()))
 
 

@@ -8,8 +8,6 @@ from gcs_tools.plan import Item
 from sitl.mavlink import codec
 from sitl.mavlink.codec import mav
 
-SILENCE_S = 5.0  # in the middle of the transfer; the vehicle asks again by itself much sooner
-
 
 class _Upload:
     """What has come of one transfer. Requests are answered at once, from within `receive`."""
@@ -17,39 +15,49 @@ class _Upload:
     def __init__(self, client: Client, items: Sequence[Item]) -> None:
         self._client, self._items = client, items
         self.requested: int | None = None
-        self.touched_s = client.wall_s
+        self.tries = 0  # since the last sign of life
+        self.retry_s = client.wall_s
         self.result: int | None = None
 
     def request(self, m: Any) -> None:
         if m.mission_type != 0 or m.target_system not in (0, SYSTEM_ID) or m.seq >= len(self._items):
             return
-        self.requested, self.touched_s = m.seq, self._client.wall_s
-        i = self._items[m.seq]
-        fields = {**i._asdict(), **self._client.address()}
-        self._client.send(codec.message("MISSION_ITEM_INT", seq=m.seq, current=int(m.seq == 0), **fields))
+        self.requested, self.tries = m.seq, 0
+        self._send()
 
     def ack(self, m: Any) -> None:
         if m.mission_type == 0 and m.target_system in (0, SYSTEM_ID):
             self.result = m.type
 
+    def again(self) -> None:
+        """Say the last thing again: it, or the answer to it, may have been lost."""
+        if self.tries == TRIES:
+            where = f"stopped at item {self.requested}" if self.requested is not None else "isn't answered"
+            raise LinkError(f"the upload of {len(self._items)} mission items {where}")
+        self.tries += 1
+        self._send()
+
+    def _send(self) -> None:
+        self.retry_s = self._client.wall_s + RETRY_S
+        address = self._client.address()
+        if self.requested is None:
+            self._client.send(codec.message("MISSION_COUNT", count=len(self._items), **address))
+            return
+        fields = {**self._items[self.requested]._asdict(), **address}
+        first = int(self.requested == 0)
+        self._client.send(codec.message("MISSION_ITEM_INT", seq=self.requested, current=first, **fields))
+
 
 def upload(client: Client, items: Sequence[Item]) -> Script[None]:
-    """Replace the vehicle's mission. Raises LinkError naming the item and the vehicle's reason if it is refused."""
-    transfer, asked_s, tries = _Upload(client, items), client.wall_s, 0
+    """Replace the vehicle's mission. Raises LinkError with the vehicle's reason if it is refused."""
+    transfer, asked_s = _Upload(client, items), client.wall_s
     client.on["MISSION_REQUEST_INT"] = client.on["MISSION_REQUEST"] = transfer.request
     client.on["MISSION_ACK"] = transfer.ack
-    count = codec.message("MISSION_COUNT", count=len(items), **client.address())
-    next_try_s = client.wall_s
     try:
         while transfer.result is None:
-            if transfer.requested is None and client.wall_s >= next_try_s:
-                if tries == TRIES:
-                    raise LinkError("the vehicle doesn't answer the mission upload")
-                client.send(count)
-                tries, next_try_s = tries + 1, client.wall_s + RETRY_S
-            if client.wall_s - transfer.touched_s > SILENCE_S and transfer.requested is not None:
-                raise LinkError(f"the mission upload stopped at item {transfer.requested} of {len(items)}")
-            yield next_try_s if transfer.requested is None else transfer.touched_s + SILENCE_S
+            if client.wall_s >= transfer.retry_s:
+                transfer.again()
+            yield transfer.retry_s
         if transfer.result != mav.MAV_MISSION_ACCEPTED:
             yield from client.pause(0.1)  # for the reason, which is told apart
             _refuse(client, transfer, asked_s)

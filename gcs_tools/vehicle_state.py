@@ -21,7 +21,7 @@ MODES = {
 MODE_NAMES = {number: name for name, number in MODES.items()}
 SEVERITIES = ("emergency", "alert", "critical", "error", "warning", "notice", "info", "debug")
 _TEXT_PIECE = 50  # a STATUSTEXT of this length goes on in the next
-_ON_CONNECT = re.compile(r"SITL.* vehicle '([^']+)'")
+_ON_CONNECT = re.compile(r"SITL.*'([^']+)'")
 
 
 class Text(NamedTuple):
