@@ -193,9 +193,7 @@ class MissionService:
         elif m.seq >= len(download.items):
             self._ack(partner, kind, mav.MAV_MISSION_INVALID_SEQUENCE)
             return
-        if download.last != m.seq:
-            download.progress_s = now_s
-        download.last = m.seq
+        download.progress_s, download.last = now_s, m.seq
         self._say(partner, download)
 
     def _say(self, partner: Partner, download: Download) -> None:

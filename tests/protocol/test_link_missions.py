@@ -293,6 +293,18 @@ def test_a_download_repeats_its_last_word_until_it_is_given_up(world: World) -> 
     assert station.all("MISSION_ITEM_INT") == []
 
 
+def test_a_slow_reader_is_not_given_up_while_it_keeps_asking(world: World) -> None:
+    station = world.station()
+    world.vehicle.mission.replace(plan(4))
+    station.send("MISSION_REQUEST_LIST", target_system=1, target_component=1)
+    for seq in range(4):
+        world.run(2.0)
+        station.forget()
+        station.send("MISSION_REQUEST_INT", target_system=1, target_component=1, seq=seq)
+    world.run(0.6)
+    assert [m.seq for m in station.all("MISSION_ITEM_INT")] == [3, 3, 3]
+
+
 def test_a_download_ends_with_its_acknowledgement(world: World) -> None:
     station = world.station()
     world.vehicle.mission.replace(plan(3))

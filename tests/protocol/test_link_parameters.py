@@ -63,7 +63,7 @@ def test_the_list_is_paced_not_flung(world: World) -> None:
         world.step()
         counts.append(len(station.all("PARAM_VALUE")) - before)
     assert max(counts) <= 25
-    assert sum(count > 0 for count in counts) > 3
+    assert sum(counts[:5]) <= 20 + 0.05 * 500 + 5  # the burst, the rate, and what flows anyway
 
 
 def test_the_list_comes_at_wall_time_also_while_the_simulation_stands(make_world: Callable[..., World]) -> None:

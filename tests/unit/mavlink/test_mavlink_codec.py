@@ -156,6 +156,8 @@ def test_half_a_frame_does_not_eat_the_whole_one_after_it() -> None:
     parser = codec.Parser()
     assert parser.feed(first[:20]) == []
     assert [frame.name for frame in parser.feed(second)] == ["HEARTBEAT"]
+    assert parser.feed(second[:9]) == []  # and the half is not waited for any more
+    assert [frame.name for frame in parser.feed(second[9:])] == ["HEARTBEAT"]
 
 
 def test_garbage_before_and_after_a_frame_is_skipped() -> None:
