@@ -424,6 +424,7 @@ def test_a_new_plan_is_told_to_every_peer_with_its_id(world: World) -> None:
     assert two.all("MISSION_CURRENT")[-1].total == 3
 
 
+@pytest.mark.compiled
 def test_a_flown_mission_reports_each_item_once(world: World) -> None:
     station = world.station()
     takeoff = MissionItem(1, 22, 1, 1, 0.0, 0.0, 0.0, NAN, 0, 0, -2.0)
