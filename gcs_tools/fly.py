@@ -23,9 +23,10 @@ def fly(
 ) -> None:
     """Fly, measure and tell the result. `check` is called often, to raise what else may have gone wrong.
 
-    Raises LinkError when it wasn't flown to its end, OSError when `out` can't be written. A flight that ran its whole
-    time is measured and told even if the landing behind it went wrong.
+    Raises LinkError when it wasn't flown to its end, ConfigError when `out` can't be written. A flight that ran its
+    whole time is measured and told even if the landing behind it went wrong.
     """
+    results.prepare(out)
     client = Client(system)
     flight = Flight(plan, client)
     fault: LinkError | None = None

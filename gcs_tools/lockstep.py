@@ -85,11 +85,12 @@ def main(args: argparse.Namespace) -> int:
     try:
         plan = plans.load(args.mission)
         vehicle = build(plan, args)
+        out = Path(args.out) if args.out else None
+        results.prepare(out)
     except ConfigError as error:
         return _complain(str(error), 2)
     flown = fly(plan, vehicle, speed=args.speed or math.inf, quiet=args.json)
     flight = flown.flight
-    out = Path(args.out) if args.out else None
     if flight.measured_s is not None:
         try:
             results.conclude(flight, vehicle=vehicle.spec.name, factor=flown.factor, out=out, as_json=args.json)

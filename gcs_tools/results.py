@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 from gcs_tools import table
 from gcs_tools.flight import Flight
 from gcs_tools.metrics import Track, report
+from sitl.strict_yaml import ConfigError
 
 GAP_S = 0.5  # of the vehicle's time without a position sample, above which the figures deserve a warning
 COLUMNS = (
@@ -33,8 +35,20 @@ COLUMNS = (
 )
 
 
+def prepare(out: Path | None) -> None:
+    """Make the folder before anything is flown: raises ConfigError if results can't be written there."""
+    if out is None:
+        return
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError(f"{out}: can't be made a folder: {error.strerror}") from None
+    if not os.access(out, os.W_OK | os.X_OK):
+        raise ConfigError(f"{out}: can't be written to")
+
+
 def conclude(flight: Flight, *, vehicle: str | None, factor: float, out: Path | None, as_json: bool) -> None:
-    """Measure a flown flight and tell the result. Raises OSError when `out` can't be written."""
+    """Measure a flown flight and tell the result; `out` is a folder that `prepare` has made."""
     metrics = flight.metrics()
     assert flight.measured_s is not None
     result = report(flight.plan.name, vehicle, flight.measured_s, metrics, factor)
@@ -50,7 +64,6 @@ def conclude(flight: Flight, *, vehicle: str | None, factor: float, out: Path | 
 
 def write(folder: Path, result: dict[str, Any], track: Track) -> None:
     """result.json and track.csv."""
-    folder.mkdir(parents=True, exist_ok=True)
     (folder / "result.json").write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
     with (folder / "track.csv").open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")

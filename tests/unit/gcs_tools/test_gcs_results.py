@@ -17,6 +17,7 @@ from gcs_tools.metrics import Track, evaluate, report
 from gcs_tools.recording import Recording
 from gcs_tools.reference import ZERO, TimedPoint, Waypoints
 from sitl.mavlink import codec
+from sitl.strict_yaml import ConfigError
 
 PLAN = """\
 name: up
@@ -46,8 +47,9 @@ def test_json_is_one_object_and_nothing_else(flight: Flight, capsys: pytest.Capt
 
 
 def test_the_folder_holds_the_result_and_a_row_per_sample(flight: Flight, tmp_path: Path) -> None:
-    results.conclude(flight, vehicle="stand-in", factor=2.0, out=tmp_path / "new" / "folder", as_json=True)
     folder = tmp_path / "new" / "folder"
+    results.prepare(folder)
+    results.conclude(flight, vehicle="stand-in", factor=2.0, out=folder, as_json=True)
     assert json.loads((folder / "result.json").read_text())["real_time_factor"] == 2.0
     with (folder / "track.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
@@ -56,6 +58,12 @@ def test_the_folder_holds_the_result_and_a_row_per_sample(flight: Flight, tmp_pa
     top = min(rows, key=lambda row: abs(float(row["t_s"]) - 2.0))
     assert float(top["ref_down_m"]) == pytest.approx(-2)
     assert (float(top["pitch_deg"]), float(top["thrust_N"])) == (95, 11)
+
+
+def test_a_folder_that_cannot_be_made_is_refused_before_the_flight(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ConfigError, match="can't be made a folder"):
+        results.prepare(tmp_path / "file" / "folder")
 
 
 def test_what_was_never_heard_is_an_empty_cell(tmp_path: Path) -> None:
