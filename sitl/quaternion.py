@@ -45,19 +45,6 @@ def rotate_back(q: Quat, v: Vec3) -> Vec3:
 
 
 @kernel
-def rotation_vector(q: Quat) -> Vec3:
-    """The rotation's axis times its angle [rad], the short way round (angle at most π)."""
-    w, x, y, z = q
-    if w < 0.0:
-        w, x, y, z = -w, -x, -y, -z
-    s = math.sqrt(x * x + y * y + z * z)
-    if s < 1e-12:
-        return 2.0 * x, 2.0 * y, 2.0 * z
-    k = 2.0 * math.atan2(s, w) / s
-    return k * x, k * y, k * z
-
-
-@kernel
 def about_x(angle: float) -> Quat:
     return math.cos(0.5 * angle), math.sin(0.5 * angle), 0.0, 0.0
 

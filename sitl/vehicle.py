@@ -20,7 +20,7 @@ from sitl.closed_loop import (
     run,
     start,
 )
-from sitl.control.gains import GAIN_NAMES, Settings, from_names
+from sitl.control.gains import GAIN_NAMES, PerAxis, Settings, from_names
 from sitl.frames import GRAVITY_M_S2, standing
 from sitl.geodesy import GeoPoint
 from sitl.model.airframe import description as airframe_description
@@ -129,16 +129,10 @@ class Vehicle:
         self._observed: Observed
         self._run(0, _NO_TRACE)
 
-    def _build_constants(self) -> None:
-        """Plant and controller constants from the parameters in force; cheap to call where nothing changed."""
-        p = self.parameters
-        if p.generation == self._generation:
-            return
-        self._generation = p.generation
-        a = self.spec.airframe.airframe
-        wind = Wind(p["SIM_WIND_N"], p["SIM_WIND_E"], p["SIM_WIND_D"], p["SIM_GUST"])
-        plant = Plant(a, self._gear, self.spec.actuators, self.spec.sensors, wind, self.spec.substeps)
-        settings = Settings(
+    def settings(self) -> Settings:
+        """The cascade's settings as the parameters in force have them."""
+        p, a = self.parameters, self.spec.airframe.airframe
+        return Settings(
             feedforward_velocity=float(p["FF_VELOCITY"]),
             feedforward_acceleration=float(p["FF_ACCEL"]),
             feedforward_inverse=float(p["FF_INVERSE"]),
@@ -150,9 +144,21 @@ class Vehicle:
             motor_tau_s=self.spec.actuators.motor_tau_s,
             slipstream_floor_N=p["CTL_SLIP_FLOOR"] * a.mass_kg * GRAVITY_M_S2,
             thrust_floor_N=p["CTL_THR_FLOOR"],
+            thrust_recover_N=p["CTL_THR_RECOVER"],
+            braking_rad_s2=PerAxis(p["CTL_BRAKE_X"], p["CTL_BRAKE_Y"], p["CTL_BRAKE_Z"]),
             lean_max_rad=math.radians(p["MPC_TILTMAX_AIR"]),
         )
-        self._controller = Controller(a, from_names({name: p[name] for name in GAIN_NAMES}), settings)
+
+    def _build_constants(self) -> None:
+        """Plant and controller constants from the parameters in force; cheap to call where nothing changed."""
+        p = self.parameters
+        if p.generation == self._generation:
+            return
+        self._generation = p.generation
+        a = self.spec.airframe.airframe
+        wind = Wind(p["SIM_WIND_N"], p["SIM_WIND_E"], p["SIM_WIND_D"], p["SIM_GUST"])
+        plant = Plant(a, self._gear, self.spec.actuators, self.spec.sensors, wind, self.spec.substeps)
+        self._controller = Controller(a, from_names({name: p[name] for name in GAIN_NAMES}), self.settings())
         self._noisy = wind.gust_m_s > 0.0 or any(self.spec.sensors[:4])
         self._plants, self._controllers = packed(plant), packed(self._controller)
         self._wind = wind

@@ -8,6 +8,8 @@ from sitl.model.airframe import Airframe
 from sitl.model.propulsion import wake_speed
 from sitl.quaternion import Vec3
 
+_ROLL_SHARE = 0.4  # of the flaps' range that roll gets even where pitch wants it all: an unchecked spin defeats both
+
 
 class Allocation(NamedTuple):
     """Actuator commands, and which demands could not be met in full (1.0)."""
@@ -43,7 +45,7 @@ def allocate(
     T_L,R = (T ± ΔT)/2 with T = F_x − F_wing,x and ΔT = (M_z − M_wing,z) / l_y. The flaps take what is left of roll and
     pitch once the wing and the propellers' torque have had their part:
     q_L δ_L + q_R δ_R = M_y' / (S_f c̄ C_Mδ),   q_L δ_L − q_R δ_R = M_x' / (lever S_f C_Lδ).
-    Yaw goes before thrust, pitch before roll.
+    Yaw goes before thrust, and pitch before roll but for a share of the flaps that roll can count on.
     """
     wake_left, wake_right = wake_speed(a, flow_left_N, u), wake_speed(a, flow_right_N, u)
     wing_f, wing_m = wing_loads(a, u, w, wake_left, wake_right)
@@ -64,8 +66,9 @@ def allocate(
     flap_left, flap_right = (pitch + roll) / (2.0 * q_left), (pitch - roll) / (2.0 * q_right)
     m = a.flap_max_rad
     half_sum = max(-m, min(m, 0.5 * (flap_left + flap_right)))
-    room = m - abs(half_sum)
+    room = max(_ROLL_SHARE * m, m - abs(half_sum))
     half_difference = max(-room, min(room, 0.5 * (flap_left - flap_right)))
+    half_sum = max(abs(half_difference) - m, min(m - abs(half_difference), half_sum))
     return Allocation(
         thrust_left,
         thrust_right,

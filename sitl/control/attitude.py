@@ -6,7 +6,7 @@ from sitl.control.gains import Loop
 from sitl.control.pid import pid
 from sitl.frames import quaternion_to_yxz, wrap_pi
 from sitl.jit import kernel
-from sitl.quaternion import Quat, Vec3, about_y, about_z, conjugate, multiply, rotate_back, rotation_vector
+from sitl.quaternion import Quat, Vec3, about_y, about_z, conjugate, multiply, rotate_back
 
 
 @kernel
@@ -27,9 +27,23 @@ def rates_of(lean_rad: float, pitch_rad: float, heading_rate: float, pitch_rate:
 
 
 @kernel
-def error_quaternion(q_NB: Quat, target: Quat) -> Vec3:
-    """Rotation vector [rad, B] from the present attitude to the target, the short way; no singularity."""
-    return rotation_vector(multiply(conjugate(q_NB), target))
+def error_quaternion(q_NB: Quat, target: Quat) -> tuple[Vec3, float]:
+    """(error as a rotation vector [rad, B], cosine of the angle between the noses); no singularity.
+
+    The nose, along which the thrust points, goes to its target the short way; the turn about the nose that is then
+    left counts less the further the nose is off (reduced attitude, as in Brescianini & D'Andrea 2018).
+    """
+    w, x, y, z = multiply(conjugate(q_NB), target)
+    nose_x = 1.0 - 2.0 * (y * y + z * z)  # the target's nose in B
+    nose_y = 2.0 * (x * y + w * z)
+    nose_z = 2.0 * (x * z - w * y)
+    sine = math.sqrt(nose_y * nose_y + nose_z * nose_z)
+    if sine < 1e-12:
+        pitch, yaw = 0.0, 0.0 if nose_x > 0.0 else math.pi
+    else:
+        angle = math.atan2(sine, nose_x)
+        pitch, yaw = -nose_z / sine * angle, nose_y / sine * angle
+    return (max(0.0, nose_x) * wrap_pi(2.0 * math.atan2(x, w)), pitch, yaw), nose_x
 
 
 @kernel
@@ -38,6 +52,18 @@ def error_yxz(q_NB: Quat, target: Quat) -> Vec3:
     phi, theta, psi = quaternion_to_yxz(q_NB[0], q_NB[1], q_NB[2], q_NB[3])
     phi_t, theta_t, psi_t = quaternion_to_yxz(target[0], target[1], target[2], target[3])
     return wrap_pi(phi_t - phi), wrap_pi(theta_t - theta), wrap_pi(psi_t - psi)
+
+
+@kernel
+def braked(error: float, p: float, braking_rad_s2: float) -> float:
+    """The error [rad] made smaller where K_p times it would be a rate from which the actuators can't brake in time.
+
+    Linear while p² e is below the braking acceleration α, then √(2 α (|e| − α / 2p²)) / p.
+    """
+    linear = braking_rad_s2 / (p * p) if p > 0.0 else math.inf
+    if abs(error) <= linear:
+        return error
+    return math.copysign(math.sqrt(2.0 * braking_rad_s2 * (abs(error) - 0.5 * linear)) / p, error)
 
 
 @kernel

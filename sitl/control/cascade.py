@@ -4,7 +4,7 @@ import math
 from typing import NamedTuple
 
 from sitl.control.allocation import allocate
-from sitl.control.attitude import attitude_of, error_quaternion, error_yxz, rate_command, rates_of
+from sitl.control.attitude import attitude_of, braked, error_quaternion, error_yxz, rate_command, rates_of
 from sitl.control.feedforward import Trim, invert, refined
 from sitl.control.gains import Gains, Settings
 from sitl.control.guidance import Guidance
@@ -20,8 +20,10 @@ from sitl.navigation import NavState
 from sitl.quaternion import Quat, Vec3, rotate_back
 
 _LOOK_S = 0.02  # how far before and after now the reference is inverted for its attitude rates
+_NEAR_COSINE = 0.7  # of the angle between the nose and its target
 _POSITION_INTEGRAL_MAX = 5.0  # m s
 _VELOCITY_INTEGRAL_MAX = 10.0  # m
+_LEARN_BELOW_M_S = 2.0  # velocity errors above it are not integrated
 _ANGLE_INTEGRAL_MAX = 1.0  # rad s
 _RATE_INTEGRAL_MAX = 2.0  # rad
 
@@ -194,6 +196,9 @@ def cascade(
     fv = (guidance.follow_velocity_north, guidance.follow_velocity_east, guidance.follow_velocity_down)
     e = _difference(v_command, velocity)
     velocity_error = (fv[0] * e[0], fv[1] * e[1], fv[2] * e[2])
+    # an error of this size is a manoeuvre, not an offset to be learned
+    far = e[0] * e[0] + e[1] * e[1] + e[2] * e[2] > _LEARN_BELOW_M_S * _LEARN_BELOW_M_S
+    tilt_held, thrust_held = tilt_held or far, thrust_held or far
     velocity_integral = _integrated(
         m.velocity_integral, velocity_error, dt_s, _VELOCITY_INTEGRAL_MAX, (tilt_held, tilt_held, thrust_held)
     )
@@ -244,7 +249,14 @@ def cascade(
     target = attitude_of(ref.heading_rad, trim.pitch_rad, trim.lean_rad)
 
     # attitude
-    error = error_quaternion(q_NB, target) if s.quaternion_error > 0.0 else error_yxz(q_NB, target)
+    error, nose = error_quaternion(q_NB, target)
+    if s.quaternion_error == 0.0:
+        error = error_yxz(q_NB, target)
+    error = (
+        braked(error[0], gains.attitude.x.p, s.braking_rad_s2.x),
+        braked(error[1], gains.attitude.y.p, s.braking_rad_s2.y),
+        braked(error[2], gains.attitude.z.p, s.braking_rad_s2.z),
+    )
     roll_held, pitch_held, yaw_held = m.roll_short > 0.0, m.pitch_short > 0.0, m.yaw_short > 0.0
     held = (roll_held, pitch_held, yaw_held)
     attitude_integral = _integrated(m.attitude_integral, error, dt_s, _ANGLE_INTEGRAL_MAX, held)
@@ -259,7 +271,10 @@ def cascade(
     # allocation
     force_x = rotate_back(q_NB, force_N)[0]
     u, _, w = rotate_back(q_NB, velocity)
-    x = allocate(a, force_x, demand, u, w, m.flow_left_N, m.flow_right_N, 0.5 * s.slipstream_floor_N, s.thrust_floor_N)
+    # thrust makes the flaps work: more of it while the nose is further than 45° off its target
+    off = max(0.0, min(1.0, 1.0 - nose / _NEAR_COSINE))
+    floor_N = s.thrust_floor_N + off * max(0.0, s.thrust_recover_N - s.thrust_floor_N)
+    x = allocate(a, force_x, demand, u, w, m.flow_left_N, m.flow_right_N, 0.5 * s.slipstream_floor_N, floor_N)
     command = Command(
         target[0], target[1], target[2], target[3],
         rate_target[0], rate_target[1], rate_target[2],

@@ -39,6 +39,12 @@ def from_names(values: dict[str, float]) -> Gains:
     return Gains(*(loop(name) for name in LOOPS))
 
 
+class PerAxis(NamedTuple):
+    x: float
+    y: float
+    z: float
+
+
 class Settings(NamedTuple):
     """What shapes the cascade beside its gains. Switches are 0.0 or 1.0."""
 
@@ -53,4 +59,6 @@ class Settings(NamedTuple):
     motor_tau_s: float  # the motors' lag as the controller knows it, for its slipstream estimate
     slipstream_floor_N: float  # total thrust below which the flaps' pressure is not believed to fall
     thrust_floor_N: float  # least total thrust in flight: the flaps live in the slipstream
+    thrust_recover_N: float  # the same while the nose is far off its target: thrust is what turns it
+    braking_rad_s2: PerAxis  # angular accelerations that the actuators can brake a turn with, B
     lean_max_rad: float  # largest tilt of the thrust from the vertical that the position loops may ask for

@@ -86,16 +86,6 @@ def test_wrapped_angles_lie_within_a_half_turn_and_mean_the_same(angle: float) -
     assert math.sin(wrapped) == pytest.approx(math.sin(angle), abs=1e-9)
 
 
-@given(ANGLE, TILT, ANGLE)
-def test_a_rotation_vector_is_axis_times_angle_the_short_way(roll: float, pitch: float, yaw: float) -> None:
-    q = frames.quaternion_from_321(roll, pitch, yaw)
-    v = np.array(quaternion.rotation_vector(q))
-    angle = np.linalg.norm(v)
-    assert angle <= math.pi + 1e-9
-    rebuilt = (math.cos(angle / 2), *(math.sin(angle / 2) / angle * v if angle > 0 else v))
-    assert matrix(rebuilt) == pytest.approx(matrix(q), abs=1e-9)
-
-
 def test_rotating_back_undoes_rotating() -> None:
     q = frames.quaternion_from_321(0.3, -0.4, 2.0)
     v = (1.0, -2.0, 3.0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sitl.control.allocation import allocate
-from sitl.control.attitude import attitude_of, error_quaternion, error_yxz, rates_of
+from sitl.control.attitude import attitude_of, braked, error_quaternion, error_yxz, rates_of
 from sitl.control.feedforward import invert
 from sitl.control.gains import GAIN_NAMES, Pid, from_names
 from sitl.control.pid import integrated, pid, smoothed
@@ -17,7 +17,7 @@ from sitl.frames import GRAVITY_M_S2, quaternion_from_yxz
 from sitl.model.derivative import loads, total
 from sitl.model.propulsion import rotor_speed
 from sitl.model.rigid_body import State
-from sitl.quaternion import multiply
+from sitl.quaternion import about_x, about_z, multiply
 from sitl.vehicle_spec import load_vehicle
 
 SPEC = load_vehicle("yawsitter")
@@ -70,13 +70,13 @@ def test_the_specific_force_keeps_its_tilt_and_its_lift() -> None:
 def test_both_attitude_errors_agree_for_small_angles_near_hover() -> None:
     now = quaternion_from_yxz(0.0, math.radians(95.0), 0.0)
     target = quaternion_from_yxz(0.01, math.radians(96.0), -0.02)
-    assert error_quaternion(now, target) == pytest.approx(error_yxz(now, target), abs=1e-3)
+    assert error_quaternion(now, target)[0] == pytest.approx(error_yxz(now, target), abs=1e-3)
 
 
 def test_the_quaternion_error_is_finite_where_the_papers_angles_are_singular() -> None:
     now = attitude_of(math.radians(90.0), math.radians(99.0), 0.0)
     target = attitude_of(math.radians(95.0), math.radians(99.0), 0.02)
-    assert np.degrees(np.linalg.norm(error_quaternion(now, target))) == pytest.approx(5.1, abs=0.3)
+    assert np.degrees(np.linalg.norm(error_quaternion(now, target)[0])) == pytest.approx(5.1, abs=0.3)
 
 
 def test_rates_of_a_turning_attitude_match_its_numerical_derivative() -> None:
@@ -119,11 +119,36 @@ def test_a_moment_beyond_the_actuators_is_cut_and_said() -> None:
 
 
 def test_pitch_is_served_before_roll() -> None:
-    x = allocate(A, 10.5, (1.0, 0.3, 0.0), 0.0, 0.0, 5.4, 5.4, 0.0, 2.0)
+    x = allocate(A, 10.5, (1.0, 0.2, 0.0), 0.0, 0.0, 5.4, 5.4, 0.0, 2.0)
     _, moment = flown_loads(x)
     assert (x.roll_short, x.pitch_short) == (1.0, 0.0)
-    assert moment[1] == pytest.approx(0.3, abs=0.01)
+    assert moment[1] == pytest.approx(0.2, abs=0.01)
     assert 0.0 < moment[0] < 1.0
+
+
+def test_roll_keeps_its_share_of_the_flaps_where_pitch_wants_them_all() -> None:
+    x = allocate(A, 10.5, (0.2, 5.0, 0.0), 0.0, 0.0, 5.4, 5.4, 0.0, 2.0)
+    _, moment = flown_loads(x)
+    assert (x.roll_short, x.pitch_short) == (0.0, 1.0)
+    assert moment[0] == pytest.approx(0.2, abs=0.01)
+    assert max(abs(x.flap_left_rad), abs(x.flap_right_rad)) == pytest.approx(A.flap_max_rad)
+
+
+def test_an_error_is_braked_only_beyond_what_the_actuators_can_stop() -> None:
+    assert braked(0.2, 5.0, 25.0) == 0.2
+    assert braked(-3.0, 8.0, 25.0) == -braked(3.0, 8.0, 25.0)
+    e, p, alpha = 2.0, 8.0, 25.0
+    rate = p * braked(e, p, alpha)
+    assert rate**2 / (2 * alpha) == pytest.approx(e, abs=0.5 * alpha / p**2 + 1e-9)  # it stops where it should
+
+
+def test_the_nose_goes_first_and_the_turn_about_it_waits() -> None:
+    now = quaternion_from_yxz(0.0, math.radians(95.0), 0.0)
+    aside = multiply(multiply(now, about_z(math.radians(100.0))), about_x(1.0))
+    (roll, pitch, yaw), nose = error_quaternion(now, aside)
+    assert nose == pytest.approx(math.cos(math.radians(100.0)))
+    assert roll == 0.0
+    assert np.degrees((pitch, yaw)) == pytest.approx((0.0, 100.0), abs=1e-6)
 
 
 def test_more_forward_force_leans_the_nose_forward() -> None:
