@@ -37,6 +37,7 @@ _ERRORS = {
     ParameterRefusal.OUT_OF_RANGE: 2,
     ParameterRefusal.READ_ONLY: 5,
     ParameterRefusal.WRONG_TYPE: 7,  # type mismatch
+    ParameterRefusal.NOT_SAVED: 3,  # permission denied
 }
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from sitl.onboard.events import EventLog
 from sitl.onboard.modes import EventKind, Severity
-from sitl.onboard.store import Store
+from sitl.onboard.store import Store, put_aside, reason
 
 _FILE = "parameters.json"
 
@@ -38,6 +38,7 @@ class ParameterRefusal(Enum):
     OUT_OF_RANGE = "out of range"
     READ_ONLY = "read-only"
     WRONG_TYPE = "wrong type"
+    NOT_SAVED = "could not be saved"
 
 
 def _representable(value: float) -> float:
@@ -92,47 +93,48 @@ class Parameters:
     def set(self, name: str, value: float, is_int: bool | None = None) -> ParameterRefusal | None:
         """Set and persist a value, or say why not and keep the old one."""
         refusal = self.check(name, value, is_int)
-        if refusal is None:
-            self._put(name, float(value) if self._declarations[name].is_int else _representable(value))
-        return refusal
+        if refusal is not None:
+            return refusal
+        return self._put({name: float(value) if self._declarations[name].is_int else _representable(value)})
 
     def put_back(self, name: str, value: float) -> None:
         """Set a value that the vehicle itself changes (a counter that runs down), read-only or not."""
-        self._put(name, value)
+        self._put({name: value})
 
-    def reset(self, group: str | None = None) -> None:
-        """Defaults, for all parameters or those of one group."""
-        for name, d in self._declarations.items():
-            if group is None or d.group == group:
-                self._put(name, self._defaults[name])
+    def reset(self, group: str | None = None) -> ParameterRefusal | None:
+        """Defaults, for all parameters or those of one group; all of them or, if they can't be saved, none."""
+        return self._put(
+            {name: self._defaults[name] for name, d in self._declarations.items() if group is None or d.group == group}
+        )
 
-    def _put(self, name: str, value: float) -> None:
-        if self._values[name] == value:
-            return
-        old = self._values[name]
-        self._values[name] = value
-        if self._declarations[name].persistent:
+    def _put(self, values: dict[str, float]) -> ParameterRefusal | None:
+        """Persist, then put in force."""
+        changed = {name: value for name, value in values.items() if self._values[name] != value}
+        if any(self._declarations[name].persistent for name in changed):
             try:
-                self._save()
+                self._save({**self._values, **changed})
             except OSError as error:
-                self._values[name] = old
-                self._events.tell(Severity.ERROR, f"parameter {name} not saved: {error.strerror}")
-                return
-        self.generation += 1
-        self._events.add(EventKind.PARAMETER, Severity.INFO, name)
+                self._events.tell(Severity.ERROR, f"parameter {next(iter(changed))} not saved: {reason(error)}")
+                return ParameterRefusal.NOT_SAVED
+        for name, value in changed.items():
+            self._values[name] = value
+            self.generation += 1
+            self._events.add(EventKind.PARAMETER, Severity.INFO, name)
+        return None
 
     def _stored(self) -> dict[str, dict[str, float]]:
         data = self._store.read(_FILE)
         return msgspec.json.decode(data, type=dict[str, dict[str, float]]) if data else {}
 
-    def _save(self) -> None:
+    def _save(self, values: dict[str, float]) -> None:
         try:
             stored = self._stored()
-        except msgspec.DecodeError:
+        except ValueError:
+            self._store.set_aside(_FILE)
             stored = {}
         stored[self._namespace] = {
             name: value
-            for name, value in self._values.items()
+            for name, value in values.items()
             if value != self._defaults[name] and self._declarations[name].persistent
         }
         self._store.write(_FILE, msgspec.json.format(msgspec.json.encode(stored)))
@@ -140,9 +142,9 @@ class Parameters:
     def _load(self) -> None:
         try:
             stored = self._stored().get(self._namespace, {})
-        except msgspec.DecodeError:
-            self._store.set_aside(_FILE)
-            self._events.tell(Severity.WARNING, "stored parameters unreadable: set aside, defaults in force")
+        except (OSError, ValueError) as error:
+            outcome = put_aside(self._store, _FILE, error)
+            self._events.tell(Severity.WARNING, f"stored parameters {outcome}: defaults in force")
             return
         for name, value in stored.items():
             refusal = self.check(name, value)

@@ -67,3 +67,19 @@ class FolderStore:
         path = self.folder / name
         if path.exists():
             os.replace(path, path.with_name(f"{name}.damaged"))
+
+
+def reason(error: OSError) -> str:
+    """What went wrong, in the operating system's words where it has some."""
+    return error.strerror or str(error) or type(error).__name__
+
+
+def put_aside(store: Store, name: str, error: Exception) -> str:
+    """Move a blob aside that `error` kept from being read, if that is possible; says what has come of it."""
+    if isinstance(error, OSError):  # it may be sound: it is just out of reach
+        return f"not readable ({reason(error)})"
+    try:
+        store.set_aside(name)
+    except OSError as second:
+        return f"damaged, and not set aside ({reason(second)})"
+    return "damaged: set aside"
