@@ -4,6 +4,8 @@ from typing import NamedTuple
 
 from sitl.onboard.modes import ACCEPTED, Outcome, Verdict
 
+MOVING_M_S = 0.5  # faster than this is not standing
+
 
 class Condition(NamedTuple):
     """What arming depends on."""

@@ -4,18 +4,24 @@ import math
 from collections.abc import Callable
 from enum import Enum
 
-from sitl.geodesy import GeoPoint, to_local
+from sitl.geodesy import GeoPoint
 from sitl.onboard.events import EventLog
 from sitl.onboard.guide import Fix, Guide
 from sitl.onboard.landing import Landing
-from sitl.onboard.mission import Frame, ItemCommand, Mission, MissionItem, MissionState
-from sitl.onboard.modes import EventKind, Severity
+from sitl.onboard.mission import INSTANT, LEAST_HEIGHT_M, ItemCommand, Mission, MissionItem, MissionState, has_place
+from sitl.onboard.modes import EventKind, Outcome, Severity
 from sitl.onboard.parameters import Parameters
-from sitl.onboard.trajectory import at
+from sitl.onboard.places import Places
 from sitl.quaternion import Vec3
 
 _JUMPS_A_TICK = 100  # a plan of jumps alone must not hang the vehicle
 _SHARP_RAD = math.radians(60.0)
+_LEAST_CLIMB_M = 0.5  # of a take-off item, wherever it starts from
+_LOOK_AHEAD = 20  # items looked through for the next place
+
+_TAKEOFFS = (ItemCommand.TAKEOFF, ItemCommand.VTOL_TAKEOFF)
+_LANDINGS = (ItemCommand.LAND, ItemCommand.VTOL_LAND)
+_DELAYS = (ItemCommand.DELAY, ItemCommand.CONDITION_DELAY)
 
 
 class Progress(Enum):
@@ -24,28 +30,11 @@ class Progress(Enum):
     RETURN = "return"  # the item hands over to Return mode
 
 
-class Places:
-    """Home and origin, for items in global frames; the commander keeps them up to date."""
-
-    def __init__(self, origin: GeoPoint) -> None:
-        self.origin = origin
-        self.home = origin
-        self.home_N: Vec3 = (0.0, 0.0, 0.0)
-
-    def of(self, item: MissionItem, here: Vec3) -> Vec3:
-        """The item's point in N [m]. Latitude and longitude both 0 mean here, as ground stations send take-off."""
-        if item.frame == Frame.LOCAL_NED:
-            return item.x * 1e-4, item.y * 1e-4, item.z
-        if item.x == 0 and item.y == 0:
-            north, east = here[0], here[1]
-        else:
-            north, east = to_local(self.origin, item.x * 1e-7, item.y * 1e-7)
-        base = self.home.alt_amsl_m if item.frame in (Frame.GLOBAL_RELATIVE_ALT, Frame.GLOBAL_RELATIVE_ALT_INT) else 0.0
-        return north, east, self.origin.alt_amsl_m - (item.z + base)
-
-
 class Executor:
-    """Flies `mission` with `guide`; `tick` says how it stands. Survives being left and resumed at the current item."""
+    """Flies `mission` with `guide`; `tick` says how it stands. Survives being left and resumed at the current item.
+
+    A plan that is replaced while it is flown goes on with the new one's first item; one that is cleared is complete.
+    """
 
     def __init__(
         self,
@@ -54,28 +43,36 @@ class Executor:
         events: EventLog,
         guide: Guide,
         places: Places,
-        set_home: Callable[[Vec3 | None], None],
+        set_home: Callable[[GeoPoint | None], Outcome],
     ) -> None:
         self._mission, self._p, self._events, self._guide = mission, parameters, events, guide
         self._places, self._set_home = places, set_home
         self._landing = Landing(parameters, guide)
         self._begun = False  # the current item has been started
+        self._complete = False
         self._revision = -1
-        self._wait_until_s = math.inf  # end of a hold or delay; inf: not waiting
+        self._wait_until_s: float | None = None  # end of a hold or delay; inf: for ever; None: not waiting
         self._point: Vec3 = (0.0, 0.0, 0.0)
+        self._centre: Vec3 = (0.0, 0.0, 0.0)
+        self._rising = False  # straight up from the ground before the item proper
         self._orbiting = False
-        self._jumps: dict[int, int] = {}
+        self._jumps: dict[int, int] = {}  # by index of the jump: how many are left
         self.landing = False
 
     def start(self, fix: Fix) -> None:
         """Begin or resume at the mission's current item."""
         if self._mission.state is MissionState.COMPLETE:
             self._mission.set_current(0)
-        if self._mission.current == 0:
+        self._take_up()
+
+    def _take_up(self) -> None:
+        """The present plan at its current item; repeated jumps count on only where a flight goes on."""
+        mission = self._mission
+        if mission.state not in (MissionState.ACTIVE, MissionState.PAUSED):
             self._jumps.clear()
-        self._mission.state = MissionState.ACTIVE
-        self._begun = False
-        self._revision = self._mission.revision
+        mission.state = MissionState.ACTIVE if mission.items else MissionState.NO_MISSION
+        self._revision = mission.revision
+        self._begun = self._complete = self.landing = False
 
     def leave(self) -> None:
         """The mode was left: the mission pauses where it is."""
@@ -84,26 +81,21 @@ class Executor:
         self._guide.speed_m_s = None
         self.landing = False
 
-    def tick(self, fix: Fix, standing: bool) -> Progress:
-        """One step. `standing`: the vehicle is on the ground with its motors idling."""
+    def tick(self, fix: Fix) -> Progress:
+        """One step."""
         mission = self._mission
         if self._revision != mission.revision:  # the plan changed, or somebody jumped
-            self._revision = mission.revision
-            self._begun = False
-            mission.state = MissionState.ACTIVE
-            if not mission.items:
-                self._guide.stop(fix)
+            self._take_up()
+        if self._complete:
+            return Progress.COMPLETE
         for _ in range(_JUMPS_A_TICK):
             if mission.current >= len(mission.items):
-                mission.state = MissionState.COMPLETE if mission.items else MissionState.NO_MISSION
-                if mission.items:
-                    mission.current = len(mission.items) - 1
-                return Progress.COMPLETE
+                return self._completed()
             item = mission.items[mission.current]
             if not self._begun:
                 self._begun = True
-                self._wait_until_s = math.inf
-                self._orbiting = self.landing = False
+                self._wait_until_s = None
+                self._orbiting = self.landing = self._rising = False
                 self._events.add(EventKind.ITEM_CURRENT, Severity.INFO, "", mission.current)
                 if item.command == ItemCommand.RETURN_TO_LAUNCH:
                     self._reached(mission.current)
@@ -113,10 +105,18 @@ class Executor:
                 if jump is not None:
                     self._next(jump)
                     continue
-            if not self._finished(item, fix, standing):
+            if not self._finished(item, fix):
                 return Progress.FLYING
             self._next(mission.current + 1)
-        return Progress.FLYING
+        self._events.tell(Severity.ERROR, "mission ended: it jumps in circles")
+        return self._completed()
+
+    def _completed(self) -> Progress:
+        mission = self._mission
+        self._complete = True
+        mission.state = MissionState.COMPLETE if mission.items else MissionState.NO_MISSION
+        mission.current = max(0, min(mission.current, len(mission.items) - 1))
+        return Progress.COMPLETE
 
     def _next(self, index: int) -> None:
         self._mission.current = index
@@ -125,105 +125,149 @@ class Executor:
     def _reached(self, index: int) -> None:
         self._events.add(EventKind.ITEM_REACHED, Severity.INFO, "", index)
 
+    # beginning an item
+
     def _begin(self, item: MissionItem, fix: Fix) -> int | None:
         """Start an item; an item that is done at once returns the index to go on with."""
-        mission, guide, here = self._mission, self._guide, fix.position_N
-        command, done = item.command, mission.current + 1
-        if command in (ItemCommand.TAKEOFF, ItemCommand.VTOL_TAKEOFF):
+        guide, here, command = self._guide, fix.position_N, item.command
+        if command in _TAKEOFFS:
             # straight up first; where the item names another place, the next waypoint goes there
-            self._point = (here[0], here[1], min(self._places.of(item, here)[2], here[2]))
+            least = here[2] - _LEAST_CLIMB_M if guide.standing else here[2]
+            self._point = (here[0], here[1], min(self._places.of(item, here)[2], least))
             guide.go(fix, self._point, self._heading(item))
-        elif command in (ItemCommand.LAND, ItemCommand.VTOL_LAND):
+        elif command in _LANDINGS:
             place = self._places.of(item, here)
             self._point = (place[0], place[1], here[2])
-            guide.go(fix, self._point, self._heading(item))
-        elif command in (
-            ItemCommand.WAYPOINT,
-            ItemCommand.SPLINE_WAYPOINT,
-            ItemCommand.LOITER_TIME,
-            ItemCommand.LOITER_UNLIMITED,
-        ):
-            self._point = self._places.of(item, here)
-            guide.go(fix, self._point, self._heading(item), arrival_N=self._arrival(item, fix))
+            if guide.standing:  # it has landed, wherever that is
+                self._start_landing(fix)
+            else:
+                guide.go(fix, self._point, self._heading(item))
         elif command == ItemCommand.LOITER_TURNS:
-            centre = self._places.of(item, here)
+            self._centre = self._flyable(item, here)
             radius = abs(item.param3) if math.isfinite(item.param3) and item.param3 != 0.0 else 2.0
-            away = math.hypot(here[0] - centre[0], here[1] - centre[1])
-            angle = math.atan2(here[1] - centre[1], here[0] - centre[0]) if away > 0.1 else 0.0
-            self._point = (centre[0] + radius * math.cos(angle), centre[1] + radius * math.sin(angle), centre[2])
-            guide.go(fix, self._point)
-        elif command in (ItemCommand.DELAY, ItemCommand.CONDITION_DELAY):
+            north, east = here[0] - self._centre[0], here[1] - self._centre[1]
+            angle = math.atan2(east, north) if math.hypot(north, east) > 0.1 else 0.0
+            n, e = self._centre[0] + radius * math.cos(angle), self._centre[1] + radius * math.sin(angle)
+            self._go_to(fix, (n, e, self._centre[2]))
+        elif has_place(item):
+            self._go_to(fix, self._flyable(item, here), item)
+        elif command in _DELAYS:
             guide.stop(fix)
             self._wait_until_s = fix.t_s + max(0.0, item.param1)
         elif command == ItemCommand.CONDITION_YAW:
             turn = math.radians(item.param1)
             if item.param4 == 1.0:  # relative, in the direction of param3
                 turn = guide.reference(fix).heading_rad + (-turn if item.param3 < 0 else turn)
-            guide.stop(fix)
-            end = at(guide.trajectory, guide.trajectory.end_s)
-            guide.go(fix, (end.north_m, end.east_m, end.down_m), turn)
+            if not guide.standing:
+                guide.turn(fix, turn)
+        elif command == ItemCommand.CONDITION_DISTANCE and self._following() is not None:
+            following = self._following()
+            assert following is not None
+            self._go_to(fix, self._flyable(following, here), following)
         else:
-            return self._do(item, fix, done)
+            return self._do(item, fix)
         return None
 
-    def _do(self, item: MissionItem, fix: Fix, done: int) -> int:
+    def _flyable(self, item: MissionItem, here: Vec3) -> Vec3:
+        """The item's point, but never in the ground."""
+        place = self._places.of(item, here)
+        return (place[0], place[1], min(place[2], -LEAST_HEIGHT_M))
+
+    def _go_to(self, fix: Fix, point_N: Vec3, item: MissionItem | None = None) -> None:
+        """Off to a point; from the ground straight up to its height first."""
+        self._point = point_N
+        self._rising = self._guide.standing
+        if self._rising:
+            self._guide.rise(fix, min(point_N[2], fix.nav.down_m - LEAST_HEIGHT_M))
+        elif item is None:
+            self._guide.go(fix, point_N)
+        else:
+            self._guide.go(fix, point_N, self._heading(item), arrival_N=self._arrival(item, fix))
+
+    def _do(self, item: MissionItem, fix: Fix) -> int:
         """An item that takes no time; returns the index to go on with."""
+        index = self._mission.current
         if item.command == ItemCommand.DO_JUMP:
-            index = self._mission.current
-            left = self._jumps.get(index, int(item.param2))
+            left = self._jumps_left(index)
             if left != 0:
                 self._jumps[index] = left - 1 if left > 0 else left
                 return int(item.param1)
             self._jumps.pop(index, None)
         elif item.command == ItemCommand.DO_CHANGE_SPEED:
-            if math.isfinite(item.param2) and item.param2 > 0.0:
+            if item.param2 > 0.0:
                 self._guide.speed_m_s = item.param2
+            elif item.param2 == -2.0:  # the default
+                self._guide.speed_m_s = None
         elif item.command == ItemCommand.DO_SET_HOME:
-            self._set_home(None if item.param1 == 1.0 else self._places.of(item, fix.position_N))
-        self._reached(self._mission.current)
-        return done
+            there = self._places.global_of(self._places.of(item, fix.position_N))
+            self._set_home(None if item.param1 == 1.0 else there)
+        self._reached(index)
+        return index + 1
 
-    def _finished(self, item: MissionItem, fix: Fix, standing: bool) -> bool:
+    def _jumps_left(self, index: int) -> int:
+        return self._jumps.get(index, int(self._mission.items[index].param2))
+
+    # the end of an item
+
+    def _finished(self, item: MissionItem, fix: Fix) -> bool:
         guide, command, index = self._guide, item.command, self._mission.current
-        if command in (ItemCommand.DELAY, ItemCommand.CONDITION_DELAY):
-            return self._waited(fix, index)
+        if self._rising:
+            if guide.done(fix) and not guide.standing:
+                self._rising = False
+                target = self._following() if command == ItemCommand.CONDITION_DISTANCE else item
+                self._go_to(fix, self._point, None if command == ItemCommand.LOITER_TURNS else target)
+            return False
+        if command in _DELAYS:
+            return self._passed(fix.t_s >= (self._wait_until_s or 0.0), index)
         if command == ItemCommand.CONDITION_YAW:
-            return self._passed(guide.done(fix), index)
+            return self._passed(guide.standing or guide.done(fix), index)
         if command == ItemCommand.CONDITION_DISTANCE:
-            return self._passed(math.dist(self._point, fix.position_N) <= item.param1, index)
-        if command in (ItemCommand.LAND, ItemCommand.VTOL_LAND):
-            return self._landed(fix, standing, index)
+            return self._passed(math.dist(self._point, fix.position_N) <= max(item.param1, self._radius(item)), index)
+        if command in _LANDINGS:
+            return self._landed(fix, index)
         if command == ItemCommand.LOITER_TURNS:
             return self._orbited(item, fix, index)
-        near = math.dist(self._point, fix.position_N) <= self._radius(item)
-        hold = item.param1 if command in (ItemCommand.WAYPOINT, ItemCommand.LOITER_TIME) else 0.0
-        stops = command != ItemCommand.WAYPOINT or hold > 0.0 or item.autocontinue == 0
-        if self._wait_until_s == math.inf:
-            if not near or (stops and not guide.done(fix)):
-                return False
-            self._reached(index)
-            if command == ItemCommand.LOITER_UNLIMITED or item.autocontinue == 0:
-                self._wait_until_s = 1e18
-            else:
-                self._wait_until_s = fix.t_s + (hold if math.isfinite(hold) else 0.0)
+        return self._arrived(item, fix, index)
+
+    def _arrived(self, item: MissionItem, fix: Fix, index: int) -> bool:
+        """At a point, and the time to hold there is over."""
+        if self._wait_until_s is not None:
+            return fix.t_s >= self._wait_until_s
+        done, near = self._guide.done(fix), math.dist(self._point, fix.position_N) <= self._radius(item)
+        if not near:
+            if done and self._passes(item):  # flew past at more than the radius: come back
+                self._guide.go(fix, self._point, self._heading(item))
+            return False
+        if not done and not self._passes(item):
+            return False
+        self._reached(index)
+        hold = item.param1 if item.command in (ItemCommand.WAYPOINT, ItemCommand.LOITER_TIME) else 0.0
+        self._wait_until_s = fix.t_s + (hold if math.isfinite(hold) else 0.0)
+        if item.command == ItemCommand.LOITER_UNLIMITED or item.autocontinue == 0:
+            self._wait_until_s = math.inf
         return fix.t_s >= self._wait_until_s
+
+    def _passes(self, item: MissionItem) -> bool:
+        """Whether the item is done within its radius; others are flown to their point, at rest."""
+        plain = item.command == ItemCommand.WAYPOINT and not item.param1 > 0.0 and item.autocontinue != 0
+        return plain and self._following() is not None
 
     def _passed(self, done: bool, index: int) -> bool:
         if done:
             self._reached(index)
         return done
 
-    def _waited(self, fix: Fix, index: int) -> bool:
-        return self._passed(fix.t_s >= self._wait_until_s, index)
+    def _landed(self, fix: Fix, index: int) -> bool:
+        if self.landing:
+            self._landing.tick(fix)
+            return self._passed(self._guide.standing, index)
+        if self._guide.done(fix):
+            self._start_landing(fix)
+        return False
 
-    def _landed(self, fix: Fix, standing: bool, index: int) -> bool:
-        if not self.landing:
-            if self._guide.done(fix):
-                self.landing = True
-                self._landing.start(fix)
-            return False
-        self._landing.tick(fix)
-        return self._passed(standing, index)
+    def _start_landing(self, fix: Fix) -> None:
+        self.landing = True
+        self._landing.start(fix)
 
     def _orbited(self, item: MissionItem, fix: Fix, index: int) -> bool:
         if not self._guide.done(fix):
@@ -231,13 +275,14 @@ class Executor:
         if not self._orbiting:
             self._orbiting = True
             clockwise = -1.0 if item.param3 < 0 else 1.0
-            centre = self._places.of(item, fix.position_N)
-            radius = math.hypot(self._point[0] - centre[0], self._point[1] - centre[1])
-            if item.param1 > 0.0 and radius > 0.0:
-                self._guide.orbit(fix, centre, radius, clockwise * item.param1)
+            radius = math.dist(self._point[:2], self._centre[:2])
+            if item.param1 > 0.0:
+                self._guide.orbit(fix, self._centre, radius, clockwise * item.param1)
                 return False
         self._reached(index)
         return True
+
+    # what an item says, and what comes after it
 
     def _radius(self, item: MissionItem) -> float:
         own = item.param2 if item.command == ItemCommand.WAYPOINT else 0.0
@@ -246,20 +291,27 @@ class Executor:
     def _heading(self, item: MissionItem) -> float | None:
         return math.radians(item.param4) if math.isfinite(item.param4) else None
 
+    def _following(self) -> MissionItem | None:
+        """The item flown after the current one, if it goes to a place in flight."""
+        items, index = self._mission.items, self._mission.current + 1
+        for _ in range(_LOOK_AHEAD):
+            if index >= len(items):
+                return None
+            item = items[index]
+            if item.command == ItemCommand.DO_JUMP and self._jumps_left(index) != 0:
+                index = int(item.param1)
+            elif item.command in INSTANT or item.command == ItemCommand.DO_JUMP:
+                index += 1
+            else:
+                return item if has_place(item) and item.command not in (*_TAKEOFFS, *_LANDINGS) else None
+        return None
+
     def _arrival(self, item: MissionItem, fix: Fix) -> Vec3:
         """Velocity at a waypoint that is flown through: along the mean of both legs, less the sharper the corner."""
-        mission, here = self._mission, fix.position_N
-        following = mission.items[mission.current + 1] if mission.current + 1 < len(mission.items) else None
-        flown_through = (
-            item.command == ItemCommand.WAYPOINT
-            and not item.param1 > 0.0
-            and item.autocontinue != 0
-            and following is not None
-            and following.command == ItemCommand.WAYPOINT
-        )
-        if not flown_through or following is None:
+        here, following = fix.position_N, self._following()
+        if not self._passes(item) or following is None or following.command == ItemCommand.LOITER_TURNS:
             return (0.0, 0.0, 0.0)
-        after = self._places.of(following, self._point)
+        after = self._flyable(following, self._point)
         one = tuple(b - a for a, b in zip(here, self._point, strict=True))
         two = tuple(b - a for a, b in zip(self._point, after, strict=True))
         length_1, length_2 = math.hypot(*one), math.hypot(*two)
@@ -268,8 +320,11 @@ class Executor:
         cos = max(-1.0, min(1.0, sum(a * b for a, b in zip(one, two, strict=True)) / (length_1 * length_2)))
         if math.acos(cos) >= _SHARP_RAD:
             return (0.0, 0.0, 0.0)
-        limits = self._guide.limits()
-        speed = min(limits.speed_m_s, math.sqrt(0.5 * limits.acceleration_m_s2 * min(length_1, length_2)))
+        m = self._guide.limits()
         mean = tuple(a / length_1 + b / length_2 for a, b in zip(one, two, strict=True))
-        k = speed * math.cos(0.5 * math.pi * math.acos(cos) / _SHARP_RAD) / math.hypot(*mean)
-        return (k * mean[0], k * mean[1], k * mean[2])
+        length = math.hypot(*mean)
+        n, e, d = (x / length for x in mean)
+        speed = math.sqrt(0.5 * min(m.acceleration_m_s2, m.climb_m_s2, m.descent_m_s2) * min(length_1, length_2))
+        speed = min(speed, m.speed_m_s, (m.climb_m_s if d < 0.0 else m.descent_m_s) / max(abs(d), 1e-6))
+        k = speed * math.cos(0.5 * math.pi * math.acos(cos) / _SHARP_RAD)
+        return (k * n, k * e, k * d)

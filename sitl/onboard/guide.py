@@ -4,10 +4,10 @@ import math
 from typing import NamedTuple
 
 from sitl.control.reference import Reference, Trajectory, rest_at
-from sitl.frames import heading
+from sitl.frames import heading, standing
 from sitl.navigation import NavState
 from sitl.onboard.parameters import Parameters
-from sitl.onboard.trajectory import Limits, Motion, at, circle, stopping, to_point
+from sitl.onboard.trajectory import COAST_S, Limits, Motion, at, circle, plan, stopping, to_point
 from sitl.quaternion import Vec3
 
 _NEAR_M, _NEAR_M_S = 2.0, 2.0  # a reference further from the vehicle than this is not where to go on from
@@ -21,6 +21,12 @@ class Fix(NamedTuple):
     nav: NavState
     feet_down: int
 
+    @classmethod
+    def at_rest(cls, now_us: int, heading_rad: float) -> "Fix":
+        """Standing at the start point."""
+        zero = (0.0, 0.0, 0.0)
+        return cls(now_us, NavState(*zero, *zero, *standing(heading_rad, 0.5 * math.pi), *zero), 4)
+
     @property
     def t_s(self) -> float:
         return self.now_us * 1e-6
@@ -30,18 +36,27 @@ class Fix(NamedTuple):
         return self.nav.north_m, self.nav.east_m, self.nav.down_m
 
     @property
+    def speed_m_s(self) -> float:
+        return math.hypot(self.nav.v_north_m_s, self.nav.v_east_m_s, self.nav.v_down_m_s)
+
+    @property
     def heading_rad(self) -> float:
         n = self.nav
         return heading(n.qw, n.qx, n.qy, n.qz)
 
 
 class Guide:
-    """Owns the trajectory and which of its derivatives bind (`follow`, in Guidance's order)."""
+    """Owns the trajectory and which of its derivatives bind (`follow`, in Guidance's order).
+
+    standing: the vehicle is on the ground, its motors idling or off; a trajectory then starts at rest where it stands.
+    """
 
     def __init__(self, parameters: Parameters, heading_rad: float) -> None:
         self._p = parameters
         self.trajectory: Trajectory = rest_at(0.0, 0.0, 0.0, heading_rad)
         self.follow = _FOLLOW_ALL
+        self.standing = True
+        self._done_s = 0.0
         self.speed_m_s: float | None = None  # asked for in flight; None: MPC_XY_CRUISE
 
     def limits(self, speed_m_s: float | None = None) -> Limits:
@@ -62,27 +77,37 @@ class Guide:
         return at(self.trajectory, fix.t_s)
 
     def motion(self, fix: Fix) -> Motion:
-        """Where a new trajectory starts: on the old one if the vehicle is near it, else at the vehicle."""
+        """Where a new trajectory starts: on the old one if the vehicle is near it, else at the vehicle.
+
+        What the old one let go of (a position, or a velocity too) starts at the vehicle in any case.
+        """
+        if self.standing:
+            return Motion(fix.position_N, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), fix.heading_rad)
         r, n = self.reference(fix), fix.nav
-        if all(self.follow[:3]):
-            off = math.dist((r.north_m, r.east_m, r.down_m), fix.position_N)
-            slip = math.dist((r.v_north_m_s, r.v_east_m_s, r.v_down_m_s), (n.v_north_m_s, n.v_east_m_s, n.v_down_m_s))
-            if off < _NEAR_M and slip < _NEAR_M_S:
-                return Motion.of(r)
-        velocity = (n.v_north_m_s, n.v_east_m_s, n.v_down_m_s)
+        old, velocity = Motion.of(r), (n.v_north_m_s, n.v_east_m_s, n.v_down_m_s)
+        p = _chosen(self.follow[:3], old.position_N, fix.position_N)
+        v = _chosen(self.follow[3:], old.velocity_N, velocity)
+        if math.dist(p, fix.position_N) < _NEAR_M and math.dist(v, velocity) < _NEAR_M_S:
+            return old._replace(position_N=p, velocity_N=v)
         return Motion(fix.position_N, velocity, (0.0, 0.0, 0.0), r.heading_rad, r.heading_rate_rad_s)
 
-    def put(self, trajectory: Trajectory, follow: tuple[float, ...] = _FOLLOW_ALL) -> None:
-        self.trajectory = trajectory
-        self.follow = follow  # type: ignore[assignment]
+    def put(
+        self,
+        trajectory: Trajectory,
+        follow: tuple[float, float, float, float, float, float] = _FOLLOW_ALL,
+        done_s: float | None = None,
+    ) -> None:
+        """Put a trajectory in force. done_s: when it has done what it is for; None: at its end."""
+        self.trajectory, self.follow = trajectory, follow
+        self._done_s = trajectory.end_s if done_s is None else done_s
 
     def rest_here(self, fix: Fix) -> None:
         """Stand still where the vehicle is."""
         self.put(rest_at(*fix.position_N, fix.heading_rad))
 
     def stop(self, fix: Fix) -> None:
-        """Come to rest smoothly."""
-        self.put(stopping(fix.t_s, self.motion(fix), self.limits()))
+        """Come to rest smoothly; standing, stay."""
+        self.rest_here(fix) if self.standing else self.put(stopping(fix.t_s, self.motion(fix), self.limits()))
 
     def go(
         self,
@@ -92,21 +117,44 @@ class Guide:
         speed_m_s: float | None = None,
         arrival_N: Vec3 = (0.0, 0.0, 0.0),
     ) -> None:
-        """Fly to a point; heading None: keep the one in force."""
-        start = self.motion(fix)
-        course = start.heading_rad if heading_rad is None else heading_rad
-        self.put(to_point(fix.t_s, start, point_N, course, self.limits(speed_m_s), arrival_N))
+        """Fly to a point; heading None: stop turning. It is done on arrival, also if it passes the point."""
+        path = to_point(fix.t_s, self.motion(fix), point_N, heading_rad, self.limits(speed_m_s), arrival_N)
+        self.put(path, done_s=path.end_s - COAST_S if any(arrival_N) else None)
+
+    def reach(
+        self,
+        fix: Fix,
+        point_N: tuple[float | None, float | None, float | None],
+        heading_rad: float | None,
+        speed_m_s: float | None,
+    ) -> None:
+        """Fly to a point; a coordinate that is None stays where a smooth stop leads."""
+        halt = stopping(fix.t_s, self.motion(fix), self.limits())
+        end = at(halt, halt.end_s)
+        north, east, down = point_N
+        target = (
+            end.north_m if north is None else north,
+            end.east_m if east is None else east,
+            end.down_m if down is None else down,
+        )
+        self.go(fix, target, heading_rad, speed_m_s)
+
+    def rise(self, fix: Fix, down_m: float, heading_rad: float | None = None) -> None:
+        """Straight up, or down, to a height, coming to rest over the ground on the way."""
+        self.put(plan(fix.t_s, self.motion(fix), self.limits(), down_m=down_m, heading_rad=heading_rad))
+
+    def over(self, fix: Fix, north_m: float, east_m: float) -> None:
+        """Level to above a place."""
+        self.put(plan(fix.t_s, self.motion(fix), self.limits(), level_N=(north_m, east_m)))
+
+    def turn(self, fix: Fix, heading_rad: float) -> None:
+        """To a heading, on the spot."""
+        self.put(plan(fix.t_s, self.motion(fix), self.limits(), heading_rad=heading_rad))
 
     def sink(self, fix: Fix, speed_m_s: float, floor_down_m: float) -> None:
         """Descend straight down at up to `speed_m_s` to `floor_down_m`, which may lie below the ground."""
-        start = self.motion(fix)
         limits = self.limits()._replace(descent_m_s=speed_m_s)
-        point = (start.position_N[0], start.position_N[1], floor_down_m)
-        if math.hypot(*start.velocity_N[:2]) > 0.1:  # brake on the way down
-            halted = stopping(fix.t_s, start, limits)
-            end = at(halted, halted.end_s)
-            point = (end.north_m, end.east_m, floor_down_m)
-        self.put(to_point(fix.t_s, start, point, start.heading_rad, limits))
+        self.put(plan(fix.t_s, self.motion(fix), limits, down_m=floor_down_m))
 
     def orbit(self, fix: Fix, centre_N: Vec3, radius_m: float, turns: float) -> None:
         """Turns around a centre, from the point of the circle where the reference stands."""
@@ -115,5 +163,14 @@ class Guide:
         self.put(circle(fix.t_s, centre_N, radius_m, angle, turns, r.heading_rad, self.limits()))
 
     def done(self, fix: Fix) -> bool:
-        """Whether the trajectory has come to its end."""
-        return fix.t_s >= self.trajectory.end_s
+        """Whether the trajectory has done what it is for."""
+        return fix.t_s >= self._done_s
+
+
+def _chosen(flags: tuple[float, ...], one: Vec3, other: Vec3) -> Vec3:
+    """Per axis `one` where the flag is set, else `other`."""
+    return (
+        one[0] if flags[0] else other[0],
+        one[1] if flags[1] else other[1],
+        one[2] if flags[2] else other[2],
+    )

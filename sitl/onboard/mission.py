@@ -11,7 +11,7 @@ import msgspec
 
 from sitl.onboard.events import EventLog
 from sitl.onboard.modes import ACCEPTED, EventKind, Outcome, Severity, Verdict
-from sitl.onboard.store import Store
+from sitl.onboard.store import Store, put_aside, reason
 
 CAPACITY = 10_000
 _FILE = "mission.json"
@@ -103,7 +103,20 @@ _WITH_PLACE = {
     ItemCommand.VTOL_TAKEOFF,
     ItemCommand.VTOL_LAND,
 }
+INSTANT = {
+    ItemCommand.DO_CHANGE_SPEED,
+    ItemCommand.DO_SET_HOME,
+    ItemCommand.DO_LAND_START,
+    ItemCommand.DO_SET_ROI_LOCATION,
+    ItemCommand.DO_SET_ROI_NONE,
+    ItemCommand.DO_SET_ROI,
+    ItemCommand.DO_VTOL_TRANSITION,
+}
+"""Items that take no time; jumps, which take none either, are a matter of their own."""
+_ABOVE_HOME = (Frame.GLOBAL_RELATIVE_ALT, Frame.GLOBAL_RELATIVE_ALT_INT)
+LEAST_HEIGHT_M = 0.2  # of a take-off, and of a point to fly to
 _FAR_M = 10_000.0
+_FLOAT_MAX = 3.4028234663852886e38
 
 
 def has_place(item: MissionItem) -> bool:
@@ -112,7 +125,8 @@ def has_place(item: MissionItem) -> bool:
 
 
 def _place(item: MissionItem) -> tuple[str, str] | None:
-    if item.command not in _WITH_PLACE:
+    elsewhere = item.command == ItemCommand.DO_SET_HOME and item.param1 != 1.0
+    if item.command not in _WITH_PLACE and not elsewhere:
         return None
     if item.frame == Frame.MISSION:
         return "frame", "an item with a position needs a frame with coordinates"
@@ -132,6 +146,38 @@ def _place(item: MissionItem) -> tuple[str, str] | None:
     return None
 
 
+def _climbs(item: MissionItem) -> tuple[str, str] | None:
+    """A take-off whose height is told from home or from the start point must lead off the ground."""
+    if item.frame == Frame.LOCAL_NED:
+        height = -item.z
+    elif item.frame in _ABOVE_HOME:
+        height = item.z
+    else:
+        return None  # above sea level: known only where it is flown
+    return None if height >= LEAST_HEIGHT_M else ("param7", f"take-off to less than {LEAST_HEIGHT_M:g} m")
+
+
+def _storable(item: MissionItem) -> tuple[str, str] | None:
+    """Whether every field fits the form in which it is kept and sent."""
+    for name, field, low, high in (
+        ("frame", "frame", 0, 0xFF),
+        ("command", "command", 0, 0xFFFF),
+        ("current", "total", 0, 0xFF),
+        ("autocontinue", "total", 0, 0xFF),
+        ("mission_type", "total", 0, 0xFF),
+        ("x", "param5", -(2**31), 2**31 - 1),
+        ("y", "param6", -(2**31), 2**31 - 1),
+    ):
+        value = getattr(item, name)
+        if not low <= value <= high or value != int(value):
+            return field, f"{name} {value} is not a whole number in {low} … {high}"
+    for name, field in (*((f"param{k}", f"param{k}") for k in range(1, 5)), ("z", "param7")):
+        value = getattr(item, name)
+        if math.isfinite(value) and abs(value) > _FLOAT_MAX:
+            return field, f"{value:g} is too large"
+    return None
+
+
 def _range(name: str, low: float, high: float, nan_ok: bool = True) -> Callable[[MissionItem], tuple[str, str] | None]:
     def check(item: MissionItem) -> tuple[str, str] | None:
         value = getattr(item, name)
@@ -147,13 +193,15 @@ _RULES: dict[int, tuple[Callable[[MissionItem], tuple[str, str] | None], ...]] =
     ItemCommand.WAYPOINT: (_range("param1", 0, 65535), _range("param2", 0, 1000), _range("param3", -1000, 1000)),
     ItemCommand.SPLINE_WAYPOINT: (_range("param1", 0, 65535),),
     ItemCommand.LOITER_TIME: (_range("param1", 0, 65535, nan_ok=False), _range("param3", -1000, 1000)),
-    ItemCommand.LOITER_TURNS: (_range("param1", 0, 1000, nan_ok=False), _range("param3", -1000, 1000)),
+    ItemCommand.LOITER_TURNS: (_range("param1", 0, 100, nan_ok=False), _range("param3", -1000, 1000)),
     ItemCommand.LOITER_UNLIMITED: (_range("param3", -1000, 1000),),
-    ItemCommand.DELAY: (_range("param1", -1, 86400, nan_ok=False),),
+    ItemCommand.TAKEOFF: (_climbs,),
+    ItemCommand.VTOL_TAKEOFF: (_climbs,),
+    ItemCommand.DELAY: (_range("param1", 0, 86400, nan_ok=False),),
     ItemCommand.CONDITION_DELAY: (_range("param1", 0, 86400, nan_ok=False),),
     ItemCommand.CONDITION_DISTANCE: (_range("param1", 0, 1e6, nan_ok=False),),
     ItemCommand.CONDITION_YAW: (_range("param1", -360, 360, nan_ok=False),),
-    ItemCommand.DO_CHANGE_SPEED: (_range("param2", -2, 50),),
+    ItemCommand.DO_CHANGE_SPEED: (_range("param1", 0, 1), _range("param2", -2, 50)),
     ItemCommand.DO_JUMP: (_range("param2", -1, 32767, nan_ok=False),),
     ItemCommand.DO_VTOL_TRANSITION: (_range("param1", 3, 3, nan_ok=False),),
 }
@@ -161,6 +209,9 @@ _RULES: dict[int, tuple[Callable[[MissionItem], tuple[str, str] | None], ...]] =
 
 def check_item(item: MissionItem, total: int) -> tuple[str, str] | None:
     """The field at fault and why, or None. `total`: how many items the plan has."""
+    misfit = _storable(item)
+    if misfit is not None:
+        return misfit
     if item.frame not in Frame._value2member_map_:
         return "frame", f"frame {item.frame} is not supported"
     if item.command not in ItemCommand._value2member_map_:
@@ -176,6 +227,16 @@ def check_item(item: MissionItem, total: int) -> tuple[str, str] | None:
         if not (math.isfinite(target) and 0 <= target < total and target == int(target)):
             return "param1", f"no item {target:g} to jump to"
     return fault
+
+
+def _circular(items: Sequence[MissionItem], index: int) -> tuple[str, str] | None:
+    """A jump back over nothing that takes time would be taken for ever within one instant."""
+    item = items[index]
+    if item.command != ItemCommand.DO_JUMP or item.param1 > index or item.param2 >= 0.0:
+        return None
+    if all(between.command in INSTANT for between in items[int(item.param1) : index]):
+        return "param1", "jumps in a circle without anything to fly"
+    return None
 
 
 class Mission:
@@ -195,7 +256,7 @@ class Mission:
         if len(items) > CAPACITY:
             return Fault(CAPACITY, "total", f"more than {CAPACITY} items")
         for index, item in enumerate(items):
-            fault = check_item(item, len(items))
+            fault = check_item(item, len(items)) or _circular(items, index)
             if fault is not None:
                 return Fault(index, *fault)
         return None
@@ -208,13 +269,14 @@ class Mission:
         try:
             self._store.write(_FILE, msgspec.json.encode([list(_finite_or_none(item)) for item in items]))
         except OSError as error:
-            return Fault(0, "total", f"not saved: {error.strerror}")
+            return Fault(0, "total", f"not saved: {reason(error)}")
         self._adopt(tuple(items))
         self._events.add(EventKind.MISSION, Severity.INFO, f"mission of {len(items)} items", len(items))
         return None
 
-    def clear(self) -> None:
-        self.replace(())
+    def clear(self) -> Fault | None:
+        """Keep no plan; a fault where that can't be saved: then the old plan stays."""
+        return self.replace(())
 
     def set_current(self, index: int, reset: bool = False) -> Outcome:
         """Go on from item `index`; with `reset` a completed mission counts as not started."""
@@ -245,20 +307,22 @@ class Mission:
         self.plan_id = crc
 
     def _load(self) -> None:
-        data = self._store.read(_FILE)
-        if data is None:
-            return
         try:
+            data = self._store.read(_FILE)
+            if data is None:
+                return
             rows = msgspec.json.decode(data, type=list[tuple[int | float | None, ...]])
             items = tuple(MissionItem(*_nan_for_none(row)) for row in rows)  # type: ignore[arg-type]
             fault = self.check(items)
-        except (msgspec.DecodeError, TypeError, ValueError):
-            fault, items = Fault(0, "total", "unreadable"), ()
-        if fault is not None:
-            self._store.set_aside(_FILE)
-            self._events.tell(Severity.WARNING, f"stored mission set aside: item {fault.index}: {fault.reason}")
-            return
-        self._adopt(items)
+            if fault is not None:
+                raise ValueError(f"item {fault.index}: {fault.reason}")
+        except OSError as error:
+            self._events.tell(Severity.WARNING, f"stored mission {put_aside(self._store, _FILE, error)}")
+        except (ValueError, TypeError, ArithmeticError) as error:
+            why = "" if isinstance(error, msgspec.DecodeError) else f" ({error})"
+            self._events.tell(Severity.WARNING, f"stored mission {put_aside(self._store, _FILE, error)}{why}")
+        else:
+            self._adopt(items)
 
 
 def _finite_or_none(item: MissionItem) -> tuple[int | float | None, ...]:

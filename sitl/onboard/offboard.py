@@ -12,6 +12,7 @@ from sitl.onboard.parameters import Parameters
 from sitl.quaternion import Vec3
 
 _STAMP_WINDOW_US = 1_000_000  # a stamp further than this from now is not of the vehicle's clock
+_REORDERED_US = 200_000  # a stamp older than the newest by no more comes from the same clock, late
 _CARRY_S = 0.2  # a target is carried forward by this much at most
 _SPACING_S = (0.005, 0.2)  # of two targets whose accelerations tell a jerk
 _JERK_MAX = 20.0  # m/s³
@@ -50,10 +51,19 @@ class Offboard:
         self.target: OffboardTarget | None = None
         self.number = 0
         self._stamp_us = 0
+        self._stamped = False  # the stamp is the target's own
+        self._held: list[float | None] = [None, None, None]
         self._jerk: Vec3 = (0.0, 0.0, 0.0)
 
+    def enter(self) -> None:
+        """Offboard flight begins: axes that no target binds are held where the vehicle is now."""
+        self._held = [None, None, None]
+
     def submit(self, target: OffboardTarget, now_us: int) -> Outcome:
-        """Take a target that arrives now. Refused when it is infinite somewhere or binds nothing."""
+        """Take a target that arrives now. Refused when it is infinite somewhere or binds nothing.
+
+        One that was overtaken on its way, by a target with a later stamp, shows that the stream lives and is left out.
+        """
         numbers = (*target.position_N, *target.velocity_N, *target.acceleration_N)
         if any(math.isinf(x) for x in (*numbers, target.heading_rad, target.heading_rate_rad_s)):
             return Outcome(Verdict.DENIED, "offboard target is infinite")
@@ -61,12 +71,15 @@ class Offboard:
             return Outcome(Verdict.DENIED, "offboard target ignores everything")
         if any(abs(x) > 1e6 for x in numbers if not math.isnan(x)):
             return Outcome(Verdict.DENIED, "offboard target is further than 1000 km or faster than sense")
-        stamp = target.stamp_us
-        if stamp is None or abs(now_us - stamp) > _STAMP_WINDOW_US:
-            stamp = now_us
-        self._jerk = self._estimated_jerk(target, stamp)
-        self.target, self._stamp_us = target, stamp
         self._arrivals.append(now_us)
+        stamp = target.stamp_us
+        stamped = stamp is not None and abs(now_us - stamp) <= _STAMP_WINDOW_US
+        if stamp is None or not stamped:
+            stamp = now_us
+        elif self._stamped and 0 < self._stamp_us - stamp <= _REORDERED_US:
+            return ACCEPTED
+        self._jerk = self._estimated_jerk(target, stamp)
+        self.target, self._stamp_us, self._stamped = target, stamp, stamped
         self.number += 1
         return ACCEPTED
 
@@ -103,44 +116,65 @@ class Offboard:
     def moving(self) -> bool:
         """Whether the newest target carries a velocity or an acceleration, so that its trajectory ends in motion."""
         t = self.target
-        return t is not None and any(_or_zero(x) != 0.0 for x in (*t.velocity_N, *t.acceleration_N))
+        return t is not None and any(
+            _or_zero(x) != 0.0 for x in (*t.velocity_N, *t.acceleration_N, t.heading_rate_rad_s)
+        )
 
-    def trajectory(self, now_us: int, heading_rad: float, nav_position_N: Vec3) -> Trajectory:
-        """The newest target as a trajectory: x = p + v τ + a τ²/2 + j τ³/6 with τ the time since its stamp, τ ≤ 0.2 s.
+    def trajectory(self, now_us: int, heading_rad: float, position_N: Vec3) -> Trajectory:
+        """The newest target as a trajectory: x = p + v τ + a τ²/2 + j τ³/6 with τ the time since its stamp.
 
-        heading_rad: what a target without heading keeps. An axis without position starts at nav_position_N.
+        It is carried forward by its age, 0.2 s at most, and then goes on for 0.2 s.
+        heading_rad, position_N: those in force now. A target without heading keeps the one, turning from it at its
+        rate. An axis without position starts at the other, and one without anything holds it for as long as no
+        target binds it.
         """
         target = self.target
         if target is None:
             raise ValueError("there is no offboard target yet")
+        now, stamp = now_us * 1e-6, max(self._stamp_us * 1e-6, now_us * 1e-6 - _CARRY_S)
         c = np.zeros((1, 4, DEGREE + 1))
-        early = max(0.0, (self._stamp_us - now_us) * 1e-6)  # a stamp ahead of now: begin now, on the same polynomial
+        start = min(stamp, now)
+        early = stamp - start  # a stamp ahead of now: begin now, on the same polynomial
+        age = now - start
         for i in range(3):
-            p, v, a = target.position_N[i], target.velocity_N[i], target.acceleration_N[i]
-            p, v, a = nav_position_N[i] if math.isnan(p) else p, _or_zero(v), _or_zero(a)
-            j = self._jerk[i]
+            p, v, a = target.position_N[i], _or_zero(target.velocity_N[i]), _or_zero(target.acceleration_N[i])
+            j = self._jerk[i] if early <= _CARRY_S else 0.0
+            if self._free(i):
+                held = self._held[i]
+                self._held[i] = p = position_N[i] if held is None else held
+            else:
+                self._held[i] = None
+            if math.isnan(p):  # not followed: told from where the vehicle is now
+                p = position_N[i] - age * (v + age * (a / 2.0 + age * j / 6.0))
+                p += early * (v - early * (a / 2.0 - early * j / 6.0))
             c[0, i, 0] = p - early * (v - early * (a / 2.0 - early * j / 6.0))
             c[0, i, 1] = v - early * (a - early * j / 2.0)
             c[0, i, 2] = (a - early * j) / 2.0
             c[0, i, 3] = j / 6.0
         rate = _or_zero(target.heading_rate_rad_s)
-        c[0, 3, 0] = (heading_rad if math.isnan(target.heading_rad) else target.heading_rad) - early * rate
+        if math.isnan(target.heading_rad):
+            c[0, 3, 0] = heading_rad - age * rate
+        else:
+            c[0, 3, 0] = target.heading_rad - early * rate
         c[0, 3, 1] = rate
-        start = self._stamp_us * 1e-6
-        return Trajectory(np.array([start - early]), c, start + _CARRY_S)
+        return Trajectory(np.array([start]), c, max(stamp, now) + _CARRY_S)
+
+    def _free(self, axis: int) -> bool:
+        """Whether the newest target binds nothing on an axis."""
+        t = self.target
+        return t is None or all(math.isnan(x[axis]) for x in (t.position_N, t.velocity_N, t.acceleration_N))
 
     def follow(self) -> tuple[float, float, float, float, float, float]:
         """Guidance's follow flags: position then velocity, per axis.
 
-        An axis with a position follows position and velocity; one with a velocity alone lets go of the position; one
-        with an acceleration alone lets go of both.
+        An axis with a position, or held for want of anything else, follows position and velocity; one with a velocity
+        alone lets go of the position; one with an acceleration alone lets go of both.
         """
         target = self.target
         if target is None:
             return (1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
-        positions = [0.0 if math.isnan(p) else 1.0 for p in target.position_N]
+        positions = [0.0 if math.isnan(p) and not self._free(i) else 1.0 for i, p in enumerate(target.position_N)]
         velocities = [
-            0.0 if p == 0.0 and math.isnan(v) and not math.isnan(a) else 1.0
-            for p, v, a in zip(positions, target.velocity_N, target.acceleration_N, strict=True)
+            0.0 if p == 0.0 and math.isnan(v) else 1.0 for p, v in zip(positions, target.velocity_N, strict=True)
         ]
         return (positions[0], positions[1], positions[2], velocities[0], velocities[1], velocities[2])

@@ -9,6 +9,7 @@ from sitl.onboard.guide import Fix, Guide
 from sitl.onboard.parameters import Parameters
 
 _DEAD = 0.05
+_TURN_RAD_S2 = 1.5
 _AHEAD_S = 1.0  # a stick's trajectory reaches so far; it is renewed every tick
 
 
@@ -40,7 +41,16 @@ class Sticks:
         return self._arrived_us is not None and (now_us - self._arrived_us) * 1e-6 > self._p["COM_MAN_LOSS_T"]
 
     def tick(self, fix: Fix, guide: Guide) -> None:
-        """Steer the reference's velocity toward what the sticks ask, at the acceleration limits."""
+        """Steer the reference's velocity toward what the sticks ask, at the acceleration limits.
+
+        A standing vehicle stays where it is until the sticks ask for a climb.
+        """
+        if guide.standing and self._axes[2] <= 0.0:
+            self._moving = False
+            guide.rest_here(fix)
+            return
+        if guide.standing and self._moving:
+            return  # the climb that lifts it off has begun
         if not self.deflected:
             if self._moving:
                 self._moving = False
@@ -62,5 +72,7 @@ class Sticks:
             target = max(-most, min(most, 2.0 * (wanted[i] - v)))
             jerk = max(-m.jerk_m_s3, min(m.jerk_m_s3, (target - a) / 0.1))
             coefficients[0, i, :4] = (p, v, a / 2.0, jerk / 6.0)
-        coefficients[0, 3, :2] = (start.heading_rad, turn * m.heading_rad_s)
+        spin = (turn * m.heading_rad_s - start.heading_rate_rad_s) / 0.1
+        spin = max(-_TURN_RAD_S2, min(_TURN_RAD_S2, spin))
+        coefficients[0, 3, :3] = (start.heading_rad, start.heading_rate_rad_s, spin / 2.0)
         guide.put(Trajectory(np.array([fix.t_s]), coefficients, fix.t_s + _AHEAD_S))
