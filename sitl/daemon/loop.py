@@ -140,7 +140,7 @@ class Loop:
             datagrams_in=self._sockets.received,
             datagrams_out=self._sockets.sent,
             datagrams_dropped=self._sockets.dropped,
-            faults=self.faults,
+            faults=self.faults + self._endpoint.faults,
             telemetry_messages=p.messages if p else 0,
             telemetry_busy_ms=p.busy_s * 1e3 if p else 0.0,
             telemetry_worst_ms=p.worst_s * 1e3 if p else 0.0,

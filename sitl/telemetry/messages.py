@@ -342,7 +342,7 @@ def parameters(now_us: int, p: "Parameters") -> ParametersMessage:
                 group=d.group,
                 is_int=d.is_int,
                 read_only=d.read_only,
-                description=d.long or d.short,
+                description=f"{d.short}. {d.long}" if d.long else d.short,
                 values={str(number): meaning for number, meaning in d.values},
             )
         )

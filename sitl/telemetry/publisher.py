@@ -1,11 +1,16 @@
 """The Zenoh edge: sends what the feed says, answers queries, holds the liveliness token.
 
-All of it runs inside the loop's turn. A put takes about a microsecond and never waits: congestion control is DROP
-with no grace time, so a full queue behind a slow, stopped or dead subscriber costs the subscriber its messages only.
-Queries wait in a ring that the loop empties; no Python runs on Zenoh's threads.
+Sending runs inside the loop's turn. A put takes some microseconds and never waits: congestion control is DROP with no
+grace time, so a full queue behind a slow, stopped or dead subscriber costs the subscriber its messages only.
+
+Answering can wait for the asker, as long as `PATIENCE_S`: a reply goes out with the congestion control that the query
+asked for, and that is BLOCK unless the asker says otherwise. So a thread of its own takes queries and sends replies;
+the loop only builds the payloads and hands them over, and telemetry goes out in another priority's queue than replies.
 """
 
 import logging
+import queue
+import threading
 import time
 from collections.abc import Callable
 from typing import Any
@@ -19,8 +24,8 @@ from sitl.telemetry.keys import Topic
 log = logging.getLogger(__name__)
 
 DEFAULT_PORT = 7447
-QUERIES_PER_TURN = 8
-QUERIES_WAITING = 64
+PATIENCE_S = 0.5  # with an asker that does not take its answer; then its connection is closed
+QUERIES_WAITING = 64  # more wait with whoever sent them
 QUIET_S = 1.0  # between two reports of the same kind of fault
 
 
@@ -42,6 +47,7 @@ def open_session(endpoint: str) -> Any:
         ("scouting/gossip/enabled", "false"),
         # by default a put waits a millisecond for room before it drops
         ("transport/link/tx/queue/congestion_control/drop/wait_before_drop", "0"),
+        ("transport/link/tx/queue/congestion_control/block/wait_before_close", str(round(PATIENCE_S * 1e6))),
     ):
         try:
             config.insert_json5(name, value)
@@ -53,6 +59,38 @@ def open_session(endpoint: str) -> Any:
         text = str(error)
         reason = "the address is in use" if "in use" in text else text.partition(" at /")[0]
         raise ZenohUnavailableError(f"Zenoh can't listen on {endpoint}: {reason}") from None
+
+
+class Answerer(threading.Thread):
+    """Takes queries, has the loop build the answers, and sends them: one query after the other.
+
+    The queue is first-in, first-out and never gives a query up: giving one up would tell the asker so, and wait for it
+    to listen while holding the lock that the next query needs.
+    """
+
+    def __init__(self, session: Any, instance: int) -> None:
+        super().__init__(name="zenoh answers", daemon=True)
+        self.asked: queue.SimpleQueue[list[Topic]] = queue.SimpleQueue()  # to the loop
+        self.answers: queue.SimpleQueue[list[tuple[Topic, bytes]] | None] = queue.SimpleQueue()  # back; None: the end
+        self._keys = {topic: zenoh.KeyExpr(keys.key(instance, topic)) for topic in keys.TOPICS if topic.queryable}
+        self._queries = session.declare_queryable(keys.all_keys(instance), zenoh.handlers.FifoChannel(QUERIES_WAITING))
+
+    def run(self) -> None:
+        while True:
+            try:
+                query = self._queries.recv()
+            except zenoh.ZError:
+                return  # the session is closed
+            self.asked.put([topic for topic, key in self._keys.items() if query.key_expr.intersects(key)])
+            answers = self.answers.get()
+            if answers is None:
+                return
+            try:
+                for topic, payload in answers:
+                    query.reply(self._keys[topic], payload, encoding=topic.encoding)
+                query.drop()  # tells the asker that there are no more replies
+            except zenoh.ZError as error:
+                log.debug("an asker went away: %s", error)
 
 
 class Publisher:
@@ -72,13 +110,13 @@ class Publisher:
                 keys.key(instance, topic),
                 encoding=topic.encoding,
                 congestion_control=zenoh.CongestionControl.DROP,
-                priority=zenoh.Priority.DATA,
+                priority=zenoh.Priority.DATA_LOW,
             )
             for topic in keys.TOPICS
             if topic.cadence is not keys.Cadence.QUERY
         }
-        self._answerable = {topic: zenoh.KeyExpr(keys.key(instance, topic)) for topic in keys.TOPICS if topic.queryable}
-        self._queries = session.declare_queryable(keys.all_keys(instance), zenoh.handlers.RingChannel(QUERIES_WAITING))
+        self._answerer = Answerer(session, instance)
+        self._answerer.start()
         self._token = session.liveliness().declare_token(keys.alive_key(instance))
 
     def attach(self, feed: Feed) -> None:
@@ -106,21 +144,13 @@ class Publisher:
         return bool(self._publishers[topic].matching_status.matching)
 
     def _answer(self, feed: Feed) -> None:
-        for _ in range(QUERIES_PER_TURN):
-            query = self._queries.try_recv()
-            if query is None:
-                return
-            try:
-                for topic, key in self._answerable.items():
-                    if query.key_expr.intersects(key):
-                        query.reply(
-                            key,
-                            feed.latest(topic),
-                            encoding=topic.encoding,
-                            congestion_control=zenoh.CongestionControl.DROP,
-                        )
-            finally:
-                query.drop()  # tells the asker that there are no more replies
+        if self._answerer.asked.empty():
+            return
+        answers: list[tuple[Topic, bytes]] = []
+        try:
+            answers.extend((topic, feed.latest(topic)) for topic in self._answerer.asked.get())
+        finally:
+            self._answerer.answers.put(answers)  # also where it failed: somebody waits for it
 
     def _complain(self, wall_s: float) -> None:
         self.faults += 1
@@ -130,6 +160,7 @@ class Publisher:
 
     def close(self) -> None:
         """Undeclare the token, so that listeners hear at once that the vehicle is gone, and close the session."""
+        self._answerer.answers.put(None)
         try:
             self._token.undeclare()
             self._session.close()

@@ -60,6 +60,7 @@ class Link:
 
     def __init__(self, craft: Craft) -> None:
         self.shutdown_requested = self.reboot_requested = False
+        self.faults = 0
         self.on_frame = None
         self.received: list = []
         self.polled: list[tuple[float, int]] = []
