@@ -53,7 +53,7 @@ class Intent(NamedTuple):
 def contact(c: Contact, now_us: int, nav: NavState, feet_down: int, r: Reference, intent: Intent) -> Contact:
     """The contact now, from the one of the last tick."""
     if c.standing:
-        rises = r.down_m < nav.down_m - _LIFT_M or r.v_down_m_s < -_LIFT_M_S or r.a_down_m_s2 < -_LIFT_M_S
+        rises = r.down_m < nav.down_m - _LIFT_M or r.v_down_m_s < -_LIFT_M_S
         if rises and not intent.landing:
             return Contact(Effort.FLY, Landed.TAKING_OFF if intent.taking_off else Landed.IN_AIR)
         return c if c.down_since_us is not None else c._replace(down_since_us=now_us)
