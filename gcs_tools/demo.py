@@ -42,12 +42,13 @@ class Simulator:
         self.connection = Connection(False, "127.0.0.1", ONBOARD_PORT + instance)
 
     def check(self) -> None:
-        """Raise LinkError if it has ended, with the last it had to say."""
+        """Raise LinkError if it has ended, with its reason or else the last it had to say."""
         code = self._process.poll()
         if code is None:
             return
         said = self._log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
-        raise LinkError(f"the simulator ended with status {code}{': ' + said[-1] if said else ''}")
+        reasons = [line for line in said if line.startswith("sitl run: ")] or said
+        raise LinkError(f"the simulator ended with status {code}{': ' + reasons[-1] if reasons else ''}")
 
 
 @contextlib.contextmanager

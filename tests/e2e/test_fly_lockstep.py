@@ -75,6 +75,12 @@ def test_a_mission_visits_its_items_in_order() -> None:
     assert times == sorted(times)
 
 
+def test_a_mission_that_ends_in_a_landing_disarms_by_itself() -> None:
+    flight = flown("rectangle-mission.yaml").flight
+    assert flight.measured_s is not None
+    assert flight.measured_s - flight.reached[-1][0] == pytest.approx(2.0, abs=0.1)  # COM_DISARM_LAND
+
+
 def test_the_qgroundcontrol_plan_is_the_yaml_mission_around_the_default_home() -> None:
     yaml, plan = plans.load(MISSIONS / "rectangle-mission.yaml"), plans.load(MISSIONS / "rectangle-mission.plan")
     assert isinstance(yaml, Uploaded)
