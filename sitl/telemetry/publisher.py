@@ -166,3 +166,4 @@ class Publisher:
             self._session.close()
         except zenoh.ZError as error:
             log.warning("Zenoh did not close cleanly: %s", error)
+        self._answerer.join(2.0 * PATIENCE_S)  # a thread inside Zenoh as the interpreter ends would abort the process
