@@ -222,15 +222,20 @@ def test_between_two_targets_the_reference_goes_on_and_then_comes_to_rest_withou
     assert (np.diff(x[:, 0]) >= -1e-9).all()
 
 
-def test_a_pure_velocity_moves_and_hands_over_to_hold_without_a_kick() -> None:
-    vehicle, rates = in_offboard(), []
+def test_a_pure_velocity_moves_and_hands_over_to_hold_where_the_vehicle_is_without_a_step() -> None:
+    vehicle, track = in_offboard(), []
     stream(vehicle, OffboardTarget(None, velocity_N=(1.0, 0.0, 0.0)), 12.0)
     assert vehicle.snapshot().truth.v_north_m_s == pytest.approx(1.0, abs=0.1)
     assert place(vehicle)[2] == pytest.approx(-3.0, abs=0.3)
+    begun = place(vehicle)[0]
     vehicle.commander.hold()
-    after(vehicle, 4.0, lambda v: rates.append(v.snapshot().truth.v_north_m_s))
-    assert np.abs(np.diff(rates)).max() < 0.04
-    assert rates[-1] == pytest.approx(0.0, abs=0.02)
+    after(vehicle, 4.0, lambda v: track.append(v.snapshot().reference))
+    x = np.array(track)
+    assert x[0, 0] - begun == pytest.approx(0.02, abs=0.005)
+    assert x[0, 3] == pytest.approx(1.0, abs=0.01)
+    assert np.abs(np.diff(x[:, 3])).max() < 0.025  # 1.2 m/s²
+    assert np.abs(np.diff(x[:, 6])).max() < 0.085  # 4 m/s³
+    assert vehicle.snapshot().truth.v_north_m_s == pytest.approx(0.0, abs=0.02)
 
 
 def test_a_heading_alone_turns_on_the_spot() -> None:
