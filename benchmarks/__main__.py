@@ -1,0 +1,64 @@
+"""`python -m benchmarks [NAME …]`: measure the figures and print them as one table."""
+
+import argparse
+import importlib
+import os
+import platform
+import sys
+import time
+
+from rich.console import Console
+
+from benchmarks.figure import Figure, show
+
+NAMES = {
+    "tracking": "both flights by both vehicles against the paper's errors; 2.5 min, 10 s with --quick",
+    "speed": "simulated seconds per second, without the link and with it",
+    "process": "a whole `sitl fly` process",
+    "start": "process start to first heartbeat and to arming",
+    "cpu": "the daemon's share of a core at 1 × real time",
+    "gains": "from a gain's write to the control step that uses it",
+    "transfers": "the parameter list, and 500 mission items up and down, over UDP",
+    "lateness": "the loop's deadlines beside a bare sleep loop's, and with a listener that never reads",
+    "shares": "where the time of a simulated second goes",
+}
+
+WIDTH = 160  # of the table where no terminal sets it
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks",
+        description="Measure what the simulator is to reach, and print it as a table.",
+        epilog="benchmarks:\n" + "\n".join(f"  {name:<11}{what}" for name, what in NAMES.items()),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument("names", nargs="*", metavar="NAME", help="these alone (all)")
+    parser.add_argument("--quick", action="store_true", help="leave the flights in real time out")
+    args = parser.parse_args()
+    if unknown := set(args.names) - set(NAMES):
+        parser.error(f"no benchmark is called {', '.join(sorted(unknown))}: there are {', '.join(NAMES)}")
+    console = Console(highlight=False, width=None if sys.stdout.isatty() else WIDTH)
+    figures: list[Figure] = []
+    failed = False
+    for name in args.names or NAMES:
+        print(f"measuring {name} ...", file=sys.stderr)
+        start_s = time.perf_counter()
+        try:
+            for figure in importlib.import_module(f"benchmarks.{name}").measure(args.quick):
+                figures.append(figure)
+        except Exception as error:  # the others are still worth measuring
+            failed = True
+            figures.append(Figure(name, "", f"not measured: {type(error).__name__}: {error}", None))
+        print(f"  {time.perf_counter() - start_s:.0f} s", file=sys.stderr)
+    show(figures, console)
+    load = f", load {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
+    console.print(f"{platform.machine()}, {os.cpu_count()} cores{load}, Python {platform.python_version()}")
+    if args.quick:
+        console.print("left out with --quick: the flights over UDP in real time")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
