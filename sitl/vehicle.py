@@ -63,7 +63,7 @@ class Vehicle:
 
     spec: what kind (load_vehicle). home: where world N has its origin and the vehicle stands at start, belly to
     `heading_rad`. seed: of gusts and sensor noise. wind_N, gust_m_s: the air's motion [m/s]. store: where parameters
-    and plan persist (None: nowhere). overrides: parameter values set at start. Raises ConfigError for an override
+    and plan persist (None: nowhere). overrides: parameter values for this run. Raises ConfigError for an override
     that the parameter's declaration refuses.
     """
 
@@ -99,7 +99,7 @@ class Vehicle:
         self.reset()
 
     def _override(self, name: str, value: float) -> None:
-        refusal = self.parameters.set(name, value)
+        refusal = self.parameters.preset(name, value)
         if refusal is None:
             return
         if refusal is ParameterRefusal.UNKNOWN:

@@ -307,10 +307,10 @@ def _storage(link: "Link", _peer: "Peer", c: Command) -> Reply:
         return denied("Storage: param1 must be 0, 1, 2 or 4, param2 0, 1 or 2")
     if link.vehicle.commander.armed:
         return Reply(mav.MAV_RESULT_TEMPORARILY_REJECTED, "Storage refused: armed")
-    if parameters >= 2.0:
-        link.vehicle.parameters.reset()
-    if mission == 2.0:
-        link.vehicle.mission.clear()
+    refused = link.vehicle.parameters.reset() if parameters >= 2.0 else None
+    fault = link.vehicle.mission.clear() if mission == 2.0 else None
+    if refused is not None or fault is not None:
+        return Reply(mav.MAV_RESULT_FAILED, "Storage: not saved")
     return DONE
 
 

@@ -14,12 +14,14 @@ class Condition(NamedTuple):
     standing: bool
     moving: bool
     terminated: bool
+    coming_down: bool = False  # in a mode that ends in a landing
 
 
 _CHECKS = (
     ("terminated", "flight was terminated: reboot first"),
     ("tipped_over", "the vehicle has tipped over"),
     ("moving", "the vehicle is moving"),
+    ("coming_down", "the mode is to land or to return: choose another"),
 )
 
 

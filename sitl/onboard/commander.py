@@ -120,11 +120,12 @@ class Commander:
 
     def ready_to_arm(self) -> Outcome:
         """Pre-arm checks; the reason names the first that fails."""
+        if self.armed:
+            return ACCEPTED
         fix = self._fix
         on_feet, moving = fix.feet_down > 0, fix.speed_m_s > arming.MOVING_M_S
-        return arming.check(
-            arming.Condition(self.tipped_over, on_feet or self.armed, moving and not self.armed, self._terminated)
-        )
+        landing = self.mode in (Mode.LAND, Mode.RETURN)
+        return arming.check(arming.Condition(self.tipped_over, on_feet, moving, self._terminated, landing))
 
     def arm(self, force: bool = False) -> Outcome:
         if self.armed:

@@ -63,7 +63,7 @@ def _choice(name: str, default: int, group: str, short: str, values: tuple[tuple
 
 
 _OFF_ON = ((0, "off"), (1, "on"))
-_LOSS_ACTIONS = ((0, "Hold"), (1, "Land"), (2, "Return"))
+_LOSS_ACTIONS = ((3, "Return"), (4, "Land"), (5, "Hold"))
 
 _TABLE = (
     # flight limits of the trajectory generator
@@ -84,7 +84,7 @@ _TABLE = (
     _real("RTL_RETURN_ALT", 5.0, 1.0, 150.0, "m", "Mission", "Least height above home on the way back"),
     # what happens when something goes missing
     _real("COM_OF_LOSS_T", 0.5, 0.1, 60.0, "s", "Failsafe", "Age of lost offboard targets (simulation time)"),
-    _choice("COM_OBL_RC_ACT", 0, "Failsafe", "Action when offboard targets are lost", _LOSS_ACTIONS),
+    _choice("COM_OBL_RC_ACT", 5, "Failsafe", "Action when offboard targets are lost", _LOSS_ACTIONS),
     _real("COM_DL_LOSS_T", 10.0, 1.0, 300.0, "s", "Failsafe", "Silence of lost ground stations (wall time)"),
     _choice("NAV_DLL_ACT", 0, "Failsafe", "Action when all ground stations are lost",
             ((0, "none"), (1, "Hold"), (2, "Return"), (3, "Land"))),

@@ -207,6 +207,41 @@ _RULES: dict[int, tuple[Callable[[MissionItem], tuple[str, str] | None], ...]] =
 }
 
 
+# which of param1 to param4 mean something (MAVLink's definitions); the others are reserved: 0 or NaN
+_USED: dict[int, str] = {
+    ItemCommand.WAYPOINT: "1234",
+    ItemCommand.LOITER_UNLIMITED: "34",
+    ItemCommand.LOITER_TURNS: "1234",
+    ItemCommand.LOITER_TIME: "1234",
+    ItemCommand.RETURN_TO_LAUNCH: "",
+    ItemCommand.LAND: "124",
+    ItemCommand.TAKEOFF: "134",
+    ItemCommand.SPLINE_WAYPOINT: "1",
+    ItemCommand.VTOL_TAKEOFF: "24",
+    ItemCommand.VTOL_LAND: "134",
+    ItemCommand.DELAY: "1234",
+    ItemCommand.CONDITION_DELAY: "1",
+    ItemCommand.CONDITION_DISTANCE: "1",
+    ItemCommand.CONDITION_YAW: "1234",
+    ItemCommand.DO_JUMP: "12",
+    ItemCommand.DO_CHANGE_SPEED: "1234",
+    ItemCommand.DO_SET_HOME: "1234",
+    ItemCommand.DO_LAND_START: "",
+    ItemCommand.DO_SET_ROI_LOCATION: "1",
+    ItemCommand.DO_SET_ROI_NONE: "1",
+    ItemCommand.DO_SET_ROI: "1234",
+    ItemCommand.DO_VTOL_TRANSITION: "12",
+}
+
+
+def _reserved(item: MissionItem) -> tuple[str, str] | None:
+    for name in ("param1", "param2", "param3", "param4"):
+        value = getattr(item, name)
+        if value and not math.isnan(value) and name[-1] not in _USED[item.command]:
+            return name, f"is reserved for command {item.command} and must not be set"
+    return None
+
+
 def check_item(item: MissionItem, total: int) -> tuple[str, str] | None:
     """The field at fault and why, or None. `total`: how many items the plan has."""
     misfit = _storable(item)
@@ -220,7 +255,7 @@ def check_item(item: MissionItem, total: int) -> tuple[str, str] | None:
         if math.isinf(getattr(item, name)):
             return name, "is infinite"
     fault = _place(item)
-    for rule in _RULES.get(item.command, ()):
+    for rule in (_reserved, *_RULES.get(item.command, ())):
         fault = fault or rule(item)
     if fault is None and item.command == ItemCommand.DO_JUMP:
         target = item.param1

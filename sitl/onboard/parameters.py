@@ -57,6 +57,7 @@ class Parameters:
         self._declarations = {d.name: d for d in declared}
         self._defaults = {d.name: d.default if d.is_int else _representable(d.default) for d in declared}
         self._values = dict(self._defaults)
+        self._presets: dict[str, float] = {}  # in force for this run only
         self._store, self._namespace, self._events = store, namespace, events
         self.names = tuple(sorted(self._declarations))
         self.generation = 0
@@ -101,21 +102,38 @@ class Parameters:
         """Set a value that the vehicle itself changes (a counter that runs down), read-only or not."""
         self._put({name: value})
 
+    def preset(self, name: str, value: float) -> ParameterRefusal | None:
+        """Set a value for this run only: in force, but not kept unless it is set again."""
+        refusal = self.check(name, value)
+        if refusal is None:
+            value = float(value) if self._declarations[name].is_int else _representable(value)
+            self._presets[name] = value
+            if self._values[name] != value:
+                self._values[name] = value
+                self.generation += 1
+        return refusal
+
     def reset(self, group: str | None = None) -> ParameterRefusal | None:
-        """Defaults, for all parameters or those of one group; all of them or, if they can't be saved, none."""
+        """Defaults for all kept parameters, or those of one group; all of them or, if they can't be saved, none."""
         return self._put(
-            {name: self._defaults[name] for name, d in self._declarations.items() if group is None or d.group == group}
+            {
+                name: self._defaults[name]
+                for name, d in self._declarations.items()
+                if d.persistent and (group is None or d.group == group)
+            }
         )
 
     def _put(self, values: dict[str, float]) -> ParameterRefusal | None:
         """Persist, then put in force."""
-        changed = {name: value for name, value in values.items() if self._values[name] != value}
+        changed = {n: v for n, v in values.items() if self._values[n] != v or n in self._presets}
+        presets = {name: value for name, value in self._presets.items() if name not in changed}
         if any(self._declarations[name].persistent for name in changed):
             try:
-                self._save({**self._values, **changed})
+                self._save({**self._values, **changed}, presets)
             except OSError as error:
                 self._events.tell(Severity.ERROR, f"parameter {next(iter(changed))} not saved: {reason(error)}")
                 return ParameterRefusal.NOT_SAVED
+        self._presets = presets
         for name, value in changed.items():
             self._values[name] = value
             self.generation += 1
@@ -126,15 +144,17 @@ class Parameters:
         data = self._store.read(_FILE)
         return msgspec.json.decode(data, type=dict[str, dict[str, float]]) if data else {}
 
-    def _save(self, values: dict[str, float]) -> None:
+    def _save(self, values: dict[str, float], presets: dict[str, float]) -> None:
+        """Store what differs from the defaults; of what is preset for this run, what was stored before."""
         try:
             stored = self._stored()
         except ValueError:
             self._store.set_aside(_FILE)
             stored = {}
+        kept = stored.get(self._namespace, {})
         stored[self._namespace] = {
             name: value
-            for name, value in values.items()
+            for name, value in {**values, **{n: kept.get(n, self._defaults[n]) for n in presets}}.items()
             if value != self._defaults[name] and self._declarations[name].persistent
         }
         self._store.write(_FILE, msgspec.json.format(msgspec.json.encode(stored)))

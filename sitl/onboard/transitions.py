@@ -52,7 +52,7 @@ AFTER: dict[tuple[Mode, Happening], Mode | str] = {
 """The mode that follows, or the parameter that says which."""
 
 ACTIONS: dict[str, dict[int, Mode]] = {
-    "COM_OBL_RC_ACT": {0: Mode.HOLD, 1: Mode.LAND, 2: Mode.RETURN},
+    "COM_OBL_RC_ACT": {3: Mode.RETURN, 4: Mode.LAND, 5: Mode.HOLD},
     "NAV_DLL_ACT": {1: Mode.HOLD, 2: Mode.RETURN, 3: Mode.LAND},
 }
 

@@ -160,6 +160,7 @@ def test_without_an_action_silent_stations_change_nothing_and_a_station_that_is_
 @pytest.mark.parametrize(
     ("condition", "reason"),
     [
+        (arming.Condition(False, True, False, False, True), "the mode is to land or to return: choose another"),
         (arming.Condition(False, True, False, True), "flight was terminated: reboot first"),
         (arming.Condition(True, True, False, False), "the vehicle has tipped over"),
         (arming.Condition(False, True, True, False), "the vehicle is moving"),

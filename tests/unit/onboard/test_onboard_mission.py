@@ -64,6 +64,8 @@ def mission(store: Store | None = None, events: EventLog | None = None) -> Missi
         (item(C.DO_JUMP, p1=NAN, p2=1.0), "param1"),
         (item(C.DO_JUMP, p1=0.0, p2=-2.0), "param2"),
         (item(C.DO_JUMP, p1=2.0, p2=-1.0), "param1"),
+        (item(C.RETURN_TO_LAUNCH, p1=7.0), "param1"),
+        (item(C.CONDITION_DELAY, p1=1.0, p3=2.0), "param3"),
         (item(C.WAYPOINT, UP, autocontinue=256), "total"),
         (item(C.WAYPOINT, UP, mission_type=-1), "total"),
         (item(C.WAYPOINT, UP, current=1000), "total"),

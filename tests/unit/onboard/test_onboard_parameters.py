@@ -188,3 +188,27 @@ def test_the_table_in_the_documentation_has_every_parameter() -> None:
     declared = declarations(SPECS["yawsitter"].gains, {})
     table = as_markdown(declared)
     assert all(f"| `{d.name}` |" in table for d in declared)
+
+
+def test_a_preset_is_in_force_for_this_run_only_and_leaves_what_was_kept() -> None:
+    store = MemoryStore()
+    first = registry(store)
+    assert first.set("GAIN", 0.25) is None
+    second = registry(store)
+    assert second.preset("GAIN", 0.125) is None
+    assert second["GAIN"] == 0.125
+    assert second.set("CHOICE", 3) is None  # a save on the way
+    third = registry(store)
+    assert (third["GAIN"], third["CHOICE"]) == (0.25, 3)
+    assert third.preset("GAIN", 0.125) is None
+    assert third.set("GAIN", 0.0625) is None  # set again: kept
+    assert registry(store)["GAIN"] == 0.0625
+
+
+def test_a_reset_leaves_the_simulations_own_settings_alone() -> None:
+    parameters = registry(MemoryStore())
+    parameters.set("COUNT", 2)
+    parameters.set("GAIN", 0.25)
+    assert parameters.reset() is None
+    assert parameters["COUNT"] == 2
+    assert parameters["GAIN"] == pytest.approx(0.1)
