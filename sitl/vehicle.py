@@ -10,19 +10,21 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sitl.closed_loop import (
-    NOISE_COLUMNS,
-    TRACE_COLUMNS,
-    Controller,
-    LoopState,
-    Observed,
-    Plant,
-    run,
-    start,
-)
+from sitl.closed_loop import NOISE_COLUMNS, TRACE_COLUMNS, Controller, LoopState, Plant, start
 from sitl.control.gains import GAIN_NAMES, PerAxis, Settings, from_names
 from sitl.frames import GRAVITY_M_S2, standing
 from sitl.geodesy import GeoPoint
+from sitl.loop_arrays import (
+    LOOP_SIZE,
+    OBSERVED_SIZE,
+    loop_of,
+    nav_of,
+    observed_of,
+    put_loop,
+    run_in_place,
+    state_of,
+)
+from sitl.model.airframe import Airframe
 from sitl.model.airframe import description as airframe_description
 from sitl.model.derivative import loads as plant_loads
 from sitl.model.rigid_body import State
@@ -63,8 +65,9 @@ class Vehicle:
 
     spec: what kind (load_vehicle). home: where world N has its origin and the vehicle stands at start, belly to
     `heading_rad`. seed: of gusts and sensor noise. wind_N, gust_m_s: the air's motion [m/s]. store: where parameters
-    and plan persist (None: nowhere). overrides: parameter values for this run. Raises ConfigError for an override
-    that the parameter's declaration refuses.
+    and plan persist (None: nowhere). overrides: parameter values for this run. believed_airframe: what the
+    controller takes the airframe to be (None: what it is). Raises ConfigError for an override that the parameter's
+    declaration refuses.
     """
 
     def __init__(
@@ -78,7 +81,9 @@ class Vehicle:
         gust_m_s: float = 0.0,
         store: Store | None = None,
         overrides: Mapping[str, float] | None = None,
+        believed_airframe: Airframe | None = None,
     ) -> None:
+        self._believed = believed_airframe or spec.airframe.airframe
         self.spec, self.seed, self.heading_rad = spec, seed, heading_rad
         self.step_us = spec.step_us
         self.now_us = 0
@@ -118,7 +123,9 @@ class Vehicle:
         q = standing(self.heading_rad, self._gear.standing_pitch_rad)
         zero = (0.0, 0.0, 0.0)
         state = State(*zero, *zero, *q, *zero, 0.0, 0.0, 0.0, 0.0)
-        self._loop: LoopState = start(self._controller, state)
+        self._loop_array = np.zeros(LOOP_SIZE)
+        self._observed_array = np.zeros(OBSERVED_SIZE)
+        put_loop(self._loop_array, start(self._controller, state))
         self._energy_J = 0.0
         self._power_W = _IDLE_W
         self._snapshot: Snapshot | None = None
@@ -126,12 +133,11 @@ class Vehicle:
         self._next_tick_us = self.now_us
         self.commander.restart(self.heading_rad)
         self._guidance = self.commander.guidance
-        self._observed: Observed
         self._run(0, _NO_TRACE)
 
     def settings(self) -> Settings:
         """The cascade's settings as the parameters in force have them."""
-        p, a = self.parameters, self.spec.airframe.airframe
+        p, a = self.parameters, self._believed
         return Settings(
             feedforward_velocity=float(p["FF_VELOCITY"]),
             feedforward_acceleration=float(p["FF_ACCEL"]),
@@ -158,16 +164,27 @@ class Vehicle:
         a = self.spec.airframe.airframe
         wind = Wind(p["SIM_WIND_N"], p["SIM_WIND_E"], p["SIM_WIND_D"], p["SIM_GUST"])
         plant = Plant(a, self._gear, self.spec.actuators, self.spec.sensors, wind, self.spec.substeps)
-        self._controller = Controller(a, from_names({name: p[name] for name in GAIN_NAMES}), self.settings())
+        gains = from_names({name: p[name] for name in GAIN_NAMES})
+        self._controller = Controller(self._believed, gains, self.settings())
         self._noisy = wind.gust_m_s > 0.0 or any(self.spec.sensors[:4])
         self._plants, self._controllers = packed(plant), packed(self._controller)
         self._wind = wind
 
+    @property
+    def loop(self) -> LoopState:
+        """Everything of plant and cascade that changes while flying."""
+        return loop_of(self._loop_array)
+
+    @loop.setter
+    def loop(self, loop: LoopState) -> None:
+        put_loop(self._loop_array, loop)
+
     def _run(self, steps: int, trace: np.ndarray[Any, np.dtype[np.float64]]) -> None:
         noise = self._random.standard_normal((steps, NOISE_COLUMNS)) if self._noisy and steps else _NO_NOISE
-        self._loop, self._observed = run(
-            self._plants, self._controllers, self._guidance, self._loop, noise, self.now_us, self.step_us, steps, trace
-        )
+        run_in_place(
+            self._plants, self._controllers, self._guidance, self._loop_array, noise, self.now_us, self.step_us, steps,
+            trace, self._observed_array,
+        )  # fmt: skip
         self.now_us += steps * self.step_us
         self.events.now_us = self.now_us
 
@@ -181,8 +198,8 @@ class Vehicle:
             self._build_constants()
             due = self.now_us >= self._next_tick_us
             if due or self.commander.changed:
-                observed = self._observed
-                self._guidance = self.commander.tick(self.now_us, observed.nav, observed.feet_down)
+                seen = self._observed_array
+                self._guidance = self.commander.tick(self.now_us, nav_of(seen), int(seen[-1]))
                 if due:
                     self._next_tick_us = self.now_us - self.now_us % TICK_US + TICK_US
                     self._drain_battery()
@@ -191,10 +208,10 @@ class Vehicle:
             steps = max(1, min((until_us - self.now_us) // self.step_us, to_tick))
             self._run(steps, trace[row : row + steps] if trace is not None else _NO_TRACE)
             row += steps
-        self.commander.observe(self.now_us, self._observed.nav, self._observed.feet_down)
+        self.commander.observe(self.now_us, nav_of(self._observed_array), int(self._observed_array[-1]))
 
     def _drain_battery(self) -> None:
-        s, a = self._loop.state, self.spec.airframe.airframe
+        s, a = state_of(self._loop_array), self.spec.airframe.airframe
         cubes = abs(s.rotor_left_rad_s) ** 3 + abs(s.rotor_right_rad_s) ** 3
         self._power_W = _IDLE_W + a.torque_coefficient * cubes / _EFFICIENCY
         self._energy_J += self._power_W * TICK_US * 1e-6
@@ -208,14 +225,14 @@ class Vehicle:
     def snapshot(self) -> Snapshot:
         """The vehicle now; built afresh only when time has moved or something has happened."""
         last = self._snapshot
-        c, m, o = self.commander, self.mission, self._observed
+        c, m, o = self.commander, self.mission, observed_of(self._observed_array)
         mark = self.events.next_number
         if last is not None and last.now_us == self.now_us and mark == self._snapshot_mark and not c.changed:
             return last
         self._snapshot_mark = mark
         self._snapshot = Snapshot(
             now_us=self.now_us,
-            truth=self._loop.state,
+            truth=state_of(self._loop_array),
             nav=o.nav,
             acceleration_B=o.specific_force_B,
             acceleration_N=o.acceleration_N,
@@ -243,7 +260,8 @@ class Vehicle:
 
     def loads(self) -> dict[str, Load]:
         """Forces and moments on the vehicle now, by cause."""
-        x = plant_loads(self.spec.airframe.airframe, self._gear, self._loop.state, self._observed.wind_N)
+        wind_N = observed_of(self._observed_array).wind_N
+        x = plant_loads(self.spec.airframe.airframe, self._gear, state_of(self._loop_array), wind_N)
         zero = (0.0, 0.0, 0.0)
         return {
             "gravity": Load(x.gravity_force, zero),
