@@ -51,7 +51,7 @@ def bare(name: str) -> Bare:
     vehicle = Vehicle(load_vehicle(name))
     guidance = Guidance(int(Effort.FLY), _trajectory())
     noisy = any(vehicle.spec.sensors[:4])
-    return Bare(vehicle._plants, vehicle._controllers, guidance, vehicle._loop, vehicle.step_us, noisy)
+    return Bare(vehicle._plants, vehicle._controllers, guidance, vehicle.loop, vehicle.step_us, noisy)
 
 
 def _trajectory() -> Trajectory:

@@ -126,11 +126,16 @@ def load(path: Path) -> LoadedAirframe:
             raise ConfigError(f"{path}: parameters: {problem}: {', '.join(sorted(names))}")
     text = path.read_text(encoding="utf-8")
     for name, entry in content.parameters.items():
-        line = strict_yaml.line_of(text, f"parameters.{name}")
-        if not math.isfinite(entry.value):
-            raise ConfigError(f"{path}:{line}: parameters.{name}: {entry.value} is not finite")
-        if name in _POSITIVE and entry.value <= 0.0:
-            raise ConfigError(f"{path}:{line}: parameters.{name}: {entry.value} must be greater than 0")
+        fault = (
+            "is not finite"
+            if not math.isfinite(entry.value)
+            else "must be greater than 0"
+            if name in _POSITIVE and entry.value <= 0.0
+            else ""
+        )
+        if fault:
+            line = strict_yaml.line_of(text, f"parameters.{name}")
+            raise ConfigError(f"{path}:{line}: parameters.{name}: {entry.value} {fault}")
     airframe = Airframe(**{name: content.parameters[name].value for name in Airframe._fields})
     if not 0.0 <= airframe.immersed_fraction <= 1.0:
         raise ConfigError(f"{path}: parameters.immersed_fraction: {airframe.immersed_fraction} must be in 0 … 1")

@@ -345,6 +345,9 @@ class Commander:
     def _watch_ground(self) -> None:
         """Decide between idling on the ground and flying; disarm after a landing."""
         fix, stood = self._fix, self.standing
+        high = fix.nav.down_m < -ground.NEAR_GROUND_M and not fix.feet_down
+        if high and self.landed is Landed.IN_AIR and not self._is_landing() and self.mode is not Mode.TAKEOFF:
+            return  # nothing that the reference could change
         r = self._guide.reference(fix)
         intent = ground.Intent(self.mode is Mode.TAKEOFF, self._is_landing())
         self._now_in(ground.contact(self._contact, fix.now_us, fix.nav, fix.feet_down, r, intent))

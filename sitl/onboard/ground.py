@@ -15,7 +15,7 @@ from sitl.onboard.modes import Landed
 _LIFT_M, _LIFT_M_S = 0.03, 0.001  # a reference this far above the ground, or rising so fast, means to fly
 _TOUCH_M, _TOUCH_M_S = 0.02, 0.3
 _REST_S = 0.4  # a reference that rests on the ground so long, with the vehicle just above it, lets it down
-_NEAR_GROUND_M = 0.6
+NEAR_GROUND_M = 0.6
 _TIPPED = -0.5  # nose's down component above which the vehicle is 60° or more from upright
 _TIPPED_S = 0.3
 _TIPPED_M_S = 0.5
@@ -60,7 +60,7 @@ def contact(c: Contact, now_us: int, nav: NavState, feet_down: int, r: Reference
     landed = intent.flying_is
     # where the vehicle takes off from is the ground; a reference at or below it means to stand
     grounded = r.down_m > -_TOUCH_M and r.v_down_m_s > -_LIFT_M_S
-    near = nav.down_m >= -_NEAR_GROUND_M or feet_down > 0
+    near = nav.down_m >= -NEAR_GROUND_M or feet_down > 0
     calm = abs(nav.v_down_m_s) < _TOUCH_M_S and math.hypot(nav.v_north_m_s, nav.v_east_m_s) < 2.0 * _TOUCH_M_S
     if not (near and grounded and calm):
         return Contact(Effort.FLY, landed)
@@ -81,7 +81,7 @@ class Tilt(NamedTuple):
 def tilt(t: Tilt, now_us: int, nav: NavState, feet_down: int) -> Tilt:
     """The tilt now, from the one of the last tick. It ends only with the vehicle upright on its feet."""
     nose_down = 2.0 * (nav.qx * nav.qz - nav.qw * nav.qy)
-    if nose_down <= _TIPPED or nav.down_m <= -_NEAR_GROUND_M:
+    if nose_down <= _TIPPED or nav.down_m <= -NEAR_GROUND_M:
         upright = nose_down < _TIPPED and feet_down > 2
         return Tilt(t.tipped_over and not upright)
     if math.hypot(nav.v_north_m_s, nav.v_east_m_s, nav.v_down_m_s) >= _TIPPED_M_S:

@@ -103,6 +103,11 @@ def _rest_to_rest_s(d: float, v: float, a: float, j: float) -> float:
     return max(SHORTEST_S, 1.875 * d / v, math.sqrt(10.0 / math.sqrt(3.0) * d / a), math.cbrt(60.0 * d / j))
 
 
+def _settling_s(axes: tuple[Axis, ...]) -> float:
+    """What is too slow to count as moving still wants its time to come to rest."""
+    return _STOP_S if any(x.v0 or x.a0 or x.v1 for x in axes) else 0.0
+
+
 def _least_s(axes: tuple[Axis, ...], v: float, a: float, j: float) -> float:
     """A time that is certainly not too long, where the search for a moving start begins."""
     far = math.hypot(*(0.0 if x.p1 is None else x.p1 - x.p0 for x in axes))
@@ -175,7 +180,7 @@ def level_s(axes: tuple[Axis, Axis], m: Limits) -> tuple[float, ...]:
     if axes[0].p1 is None or axes[1].p1 is None:
         return (_STOP_S if any(x.v0 or x.a0 for x in axes) else 0.0,)
     distance = math.hypot(axes[0].p1 - axes[0].p0, axes[1].p1 - axes[1].p0)
-    return (_rest_to_rest_s(distance, m.speed_m_s, m.acceleration_m_s2, m.jerk_m_s3),)
+    return (max(_settling_s(axes), _rest_to_rest_s(distance, m.speed_m_s, m.acceleration_m_s2, m.jerk_m_s3)),)
 
 
 def height_s(x: Axis, m: Limits) -> tuple[float, ...]:
@@ -187,7 +192,7 @@ def height_s(x: Axis, m: Limits) -> tuple[float, ...]:
     # it speeds up in one direction and brakes in the other
     acceleration = min(m.climb_m_s2, m.descent_m_s2)
     speed = m.climb_m_s if x.p1 < x.p0 else m.descent_m_s
-    return (_rest_to_rest_s(abs(x.p1 - x.p0), speed, acceleration, m.jerk_m_s3),)
+    return (max(_settling_s((x,)), _rest_to_rest_s(abs(x.p1 - x.p0), speed, acceleration, m.jerk_m_s3)),)
 
 
 def turn_s(x: Axis, m: Limits) -> tuple[float, ...]:
@@ -198,7 +203,7 @@ def turn_s(x: Axis, m: Limits) -> tuple[float, ...]:
         excess = _line_excess(x, rate, rate, acceleration, acceleration, jerk)
         times = _times_s((x,), excess, _least_s((x,), rate, acceleration, jerk))
         return times or _with_halt((x,), lambda group: turn_s(group[0], m))
-    return (_rest_to_rest_s(abs(x.p1 - x.p0), rate, acceleration, jerk),)
+    return (max(_settling_s((x,)), _rest_to_rest_s(abs(x.p1 - x.p0), rate, acceleration, jerk)),)
 
 
 def _with_halt(axes: tuple[Axis, ...], times_s: Callable[[tuple[Axis, ...]], tuple[float, ...]]) -> tuple[float, ...]:

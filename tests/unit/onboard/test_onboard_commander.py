@@ -217,8 +217,8 @@ def test_a_vehicle_that_falls_over_says_so_stops_and_cannot_be_armed() -> None:
     vehicle = hovering(1.0)
     c = vehicle.commander
     c.disarm(force=True)
-    tilted = vehicle._loop.state._replace(q_rad_s=3.0, v_north_m_s=1.0)
-    vehicle._loop = vehicle._loop._replace(state=tilted)
+    tilted = vehicle.loop.state._replace(q_rad_s=3.0, v_north_m_s=1.0)
+    vehicle.loop = vehicle.loop._replace(state=tilted)
     after(vehicle, 6.0)
     assert c.tipped_over
     assert "the vehicle has tipped over: motors stopped" in texts(vehicle.events)

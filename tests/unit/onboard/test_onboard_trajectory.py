@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from sitl.control.reference import Trajectory, sample
@@ -82,6 +82,7 @@ def assert_starts_as(path: Trajectory, start: Motion) -> None:
 
 
 @settings(max_examples=200, deadline=None)
+@example(Motion((0.0, 0.0, 0.0), (0.0, 0.0, 0.001), (0.0, 0.0, 0.0), 0.0), (0.0, 0.0, 0.0), None)
 @given(motions, vectors(30.0, 30.0, 20.0), courses)
 def test_a_flight_from_any_motion_keeps_to_the_limits_and_ends_at_its_point(
     start: Motion, target: tuple[float, float, float], course: float | None

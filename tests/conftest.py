@@ -1,0 +1,12 @@
+"""Property tests draw the same examples on every run, so that a suite that passed passes again.
+
+HYPOTHESIS_PROFILE=explore draws new ones: the way to look for what nobody has thought of.
+"""
+
+import os
+
+from hypothesis import settings
+
+settings.register_profile("repeatable", derandomize=True, deadline=None)
+settings.register_profile("explore", deadline=None, max_examples=500)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "repeatable"))

@@ -1,0 +1,32 @@
+import numpy as np
+
+from sitl.closed_loop import NOISE_COLUMNS, TRACE_COLUMNS, run
+from sitl.loop_arrays import LOOP_SIZE, OBSERVED_SIZE, loop_of, nav_of, observed_of, put_loop, run_in_place, state_of
+from sitl.vehicle import Vehicle, load_vehicle
+
+
+def test_every_number_of_the_loops_state_survives_the_array() -> None:
+    numbers = np.arange(1.0, LOOP_SIZE + 1.0)
+    again = np.zeros(LOOP_SIZE)
+    put_loop(again, loop_of(numbers))
+    assert (again == numbers).all()
+    assert tuple(state_of(numbers)) == tuple(numbers[:17])
+
+
+def test_running_in_place_is_running() -> None:
+    vehicle = Vehicle(load_vehicle("yawsitter-real"))
+    vehicle.commander.takeoff()
+    vehicle.commander.arm()
+    vehicle.advance(2_000_000)
+    noise = np.random.default_rng(1).standard_normal((10, NOISE_COLUMNS))
+    traces = [np.zeros((10, len(TRACE_COLUMNS))) for _ in range(2)]
+    array, seen = np.zeros(LOOP_SIZE), np.zeros(OBSERVED_SIZE)
+    put_loop(array, vehicle.loop)
+    constants = vehicle._plants, vehicle._controllers, vehicle._guidance
+    loop, observed = run(*constants, vehicle.loop, noise, 2_000_000, 2000, 10, traces[0])
+    run_in_place(*constants, array, noise, 2_000_000, 2000, 10, traces[1], seen)
+    assert loop_of(array) == loop
+    assert observed_of(seen) == observed
+    assert nav_of(seen) == observed.nav
+    assert (traces[0] == traces[1]).all()
+    assert traces[0].any()
