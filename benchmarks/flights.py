@@ -11,9 +11,10 @@ from benchmarks.processes import ROOT, BenchmarkError
 from gcs_tools import plan as plans
 from gcs_tools.plan import Streamed, Uploaded
 from gcs_tools.reference import Waypoints
-from sitl.closed_loop import NOISE_COLUMNS, TRACE_COLUMNS, LoopState, run
+from sitl.closed_loop import NOISE_COLUMNS, TRACE_COLUMNS, LoopState
 from sitl.control.guidance import Effort, Guidance
 from sitl.control.reference import DEGREE, Trajectory
+from sitl.loop_arrays import LOOP_SIZE, OBSERVED_SIZE, put_loop, run_in_place, state_of
 from sitl.model.rigid_body import State
 from sitl.onboard.mission import MissionItem, MissionState
 from sitl.onboard.modes import Mode
@@ -73,16 +74,19 @@ def fly_bare(flight: Bare, steps_at_once: int) -> float:
     """AIRBORNE_S of the rectangle in crossings of so many steps, to where it should be then. Returns seconds."""
     random = np.random.Generator(np.random.PCG64(1))
     none = np.zeros((0, NOISE_COLUMNS))
-    loop, now_us, left = flight.loop, 0, round(AIRBORNE_S * 1e6) // flight.step_us
+    loop, seen = np.zeros(LOOP_SIZE), np.zeros(OBSERVED_SIZE)
+    put_loop(loop, flight.loop)
+    now_us, left = 0, round(AIRBORNE_S * 1e6) // flight.step_us
     while left > 0:
         steps = min(left, steps_at_once)
         noise = random.standard_normal((steps, NOISE_COLUMNS)) if flight.noisy else none
-        loop, _ = run(
-            flight.plants, flight.controllers, flight.guidance, loop, noise, now_us, flight.step_us, steps, _NO_TRACE
-        )
+        run_in_place(
+            flight.plants, flight.controllers, flight.guidance, loop, noise, now_us, flight.step_us, steps, _NO_TRACE,
+            seen,
+        )  # fmt: skip
         now_us += steps * flight.step_us
         left -= steps
-    _check(loop.state, streamed().reference.at(AIRBORNE_S).position_m)
+    _check(state_of(loop), streamed().reference.at(AIRBORNE_S).position_m)
     return AIRBORNE_S
 
 
