@@ -168,7 +168,6 @@ class Vehicle:
         self._controller = Controller(self._believed, gains, self.settings())
         self._noisy = wind.gust_m_s > 0.0 or any(self.spec.sensors[:4])
         self._plants, self._controllers = packed(plant), packed(self._controller)
-        self._wind = wind
 
     @property
     def loop(self) -> LoopState:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 from sitl.frames import GRAVITY_M_S2
 from sitl.jit import kernel
 from sitl.model.airframe import Airframe
-from sitl.quaternion import Quat, Vec3, rotate
+from sitl.quaternion import Vec3, rotate
 
 
 class State(NamedTuple):
@@ -28,21 +28,6 @@ class State(NamedTuple):
     rotor_right_rad_s: float
     flap_left_rad: float
     flap_right_rad: float
-
-
-@kernel
-def attitude(s: State) -> Quat:
-    return s.qw, s.qx, s.qy, s.qz
-
-
-@kernel
-def velocity(s: State) -> Vec3:
-    return s.v_north_m_s, s.v_east_m_s, s.v_down_m_s
-
-
-@kernel
-def rates(s: State) -> Vec3:
-    return s.p_rad_s, s.q_rad_s, s.r_rad_s
 
 
 @kernel
