@@ -21,7 +21,7 @@ from sitl.daemon.clock import TURN_S, Lateness
 from sitl.daemon.config import RunConfig
 from sitl.daemon.loop import Loop
 from sitl.daemon.main import wall_clock
-from sitl.daemon.udp import Port, Sockets
+from sitl.daemon.udp import Sockets
 
 SEGMENT_S = 4.0
 SEGMENTS = 3
@@ -75,7 +75,7 @@ def _assembled(config: RunConfig) -> Iterator[Loop]:
     with contextlib.ExitStack() as stack:
         state = stack.enter_context(tempfile.TemporaryDirectory(prefix="yawsitter-benchmark-"))
         config = config._replace(state_dir=Path(state))
-        sockets = Sockets({Port.GCS: config.local_gcs, Port.ONBOARD: config.local_onboard}, config.instance)
+        sockets = Sockets(config.local_ports, config.instance)
         stack.callback(sockets.close)
         publisher = assembly.open_publisher(config)
         assert publisher is not None

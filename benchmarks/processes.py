@@ -16,7 +16,7 @@ T = TypeVar("T")
 
 ROOT = Path(__file__).resolve().parents[1]
 INSTANCES = range(70, 90)  # away from those in daily use
-LOCAL_GCS, LOCAL_ONBOARD, PEER_ONBOARD, ZENOH = 18570, 14580, 14540, 7447
+LOCAL_GCS, LOCAL_ONBOARD, ZENOH = 18570, 14580, 7447
 _STOP_S = 5.0
 
 
@@ -28,7 +28,7 @@ def free_instances(count: int) -> list[int]:
     """Instances none of whose ports is in use. Raises BenchmarkError."""
     found = []
     for instance in INSTANCES:
-        ports = (LOCAL_GCS + instance, LOCAL_ONBOARD + instance, PEER_ONBOARD + instance)
+        ports = (LOCAL_GCS + instance, LOCAL_ONBOARD + instance)
         if all(map(_free, ports)) and not _answers(ZENOH + instance):
             found.append(instance)
             if len(found) == count:
@@ -94,8 +94,8 @@ def daemon(instance: int, *options: str) -> Iterator[subprocess.Popen[str]]:
 
 
 def onboard(instance: int) -> str:
-    """The connection of a client where this instance sends to onboard computers."""
-    return f"udpin:127.0.0.1:{PEER_ONBOARD + instance}"
+    """The connection of a client that calls this instance as an onboard computer."""
+    return f"udpout:127.0.0.1:{LOCAL_ONBOARD + instance}"
 
 
 def ground(instance: int) -> str:

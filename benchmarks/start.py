@@ -5,7 +5,8 @@ import time
 from collections.abc import Iterator
 
 from benchmarks.figure import Figure, at_most
-from benchmarks.processes import LOCAL_ONBOARD, PEER_ONBOARD, BenchmarkError, daemon, free_instance
+from benchmarks.processes import LOCAL_ONBOARD, BenchmarkError, daemon, free_instance
+from sitl.daemon.config import ONBOARD_PEER_LAST
 from sitl.mavlink import codec
 from sitl.mavlink.codec import mav
 
@@ -25,7 +26,7 @@ def measure(quick: bool) -> Iterator[Figure]:
 def _one_start() -> tuple[float, float]:
     instance = free_instance()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as peer:
-        peer.bind(("127.0.0.1", PEER_ONBOARD + instance))
+        peer.bind(("127.0.0.1", ONBOARD_PEER_LAST))
         peer.settimeout(_ASK_S)
         born_s = time.perf_counter()
         with daemon(instance):
@@ -43,9 +44,11 @@ def _watch(peer: socket.socket, instance: int, born_s: float) -> tuple[float, fl
             asked_s = now_s
             peer.sendto(encoder.encode(arm), ("127.0.0.1", LOCAL_ONBOARD + instance))
         try:
-            data = peer.recv(65_535)
+            data, (_, port) = peer.recvfrom(65_535)
         except TimeoutError:
             continue
+        if port != LOCAL_ONBOARD + instance:
+            continue  # all high instances send there
         now_s = time.perf_counter()
         for frame in parser.feed(data):
             if frame.name == "HEARTBEAT" and heartbeat_s is None:

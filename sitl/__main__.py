@@ -22,10 +22,12 @@ Run one vehicle: it is simulated in real time and spoken to over MAVLink (UDP) a
 
 Instance I (default 0) uses, like PX4's simulator:
   UDP 18570+I  for ground stations, sending to 127.0.0.1:14550 from the start (QGroundControl finds it by itself)
-  UDP 14580+I  for onboard computers, sending to 127.0.0.1:14540+I from the start (MAVSDK's default is 14540)
+  UDP 14580+I  for onboard computers, sending to 127.0.0.1:14540+I from the start (MAVSDK's default is 14540);
+               all instances from 9 on send to 14549, and are told apart by their system ids
+  UDP 19450+I  with --hil-viewer, sending the true state to 127.0.0.1:19410+I (instances 0 to 39)
   TCP 7447+I   Zenoh telemetry, keys yawsitter/I/... (docs/telemetry.md)
-Whoever writes to a UDP port is served too. The MAVLink system id is I+1. Instances 0 to 39 keep out of each other's
-ports. Everything listens on this machine only, unless --listen says otherwise.
+Whoever writes to a UDP port is served too. The MAVLink system id is I+1. Everything listens on this machine only,
+unless --listen says otherwise. Each vehicle needs a state folder of its own.
 
 {VEHICLES}"""
 
@@ -38,6 +40,7 @@ examples:
   sitl run --wind 1,0,0 --gust 0.5 --seed 7        air moving north at 1 m/s, with gusts
   sitl run --listen 0.0.0.0 --gcs 192.168.1.20:14550    a ground station on another machine
   sitl run --set RATE_Y_P=0.4 --set SIM_TLM_RATE=100    parameters, as if written over the link
+  sitl run --hil-viewer                            shown by a viewer made for PX4's simulation in hardware
   sitl run --instance 1 --record logs              a second vehicle, every MAVLink frame kept in logs/*.tlog
 
 While it runs, the parameters SIM_SPEED (0: as fast as possible), SIM_PAUSE and SIM_STEP_MS (run so many milliseconds
@@ -220,6 +223,11 @@ def _parser() -> argparse.ArgumentParser:
         metavar="ENDPOINT",
         help="where Zenoh listens (tcp/127.0.0.1:7447+I)",
     )
+    run.add_argument(
+        "--hil-viewer",
+        action="store_true",
+        help="send HEARTBEAT and HIL_STATE_QUATERNION (25 Hz, true state) to 127.0.0.1:19410+I for jMAVSim or Hawkeye",
+    )
     run.add_argument("--record", type=Path, metavar="DIR", help="keep every MAVLink frame in DIR, as a new .tlog")
     run.add_argument("--verbose", action="store_true", help="log more")
 
@@ -258,6 +266,7 @@ def _run(args: argparse.Namespace) -> int:
         zenoh=not args.no_zenoh,
         record_dir=args.record,
         listen=args.listen,
+        hil_viewer=args.hil_viewer,
     )
     return daemon.main(settings, verbose=args.verbose)
 

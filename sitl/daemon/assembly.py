@@ -2,10 +2,9 @@
 
 import gc
 from collections.abc import Callable
-from typing import Any
 
 from sitl.daemon.boot import Boot
-from sitl.daemon.config import RunConfig, SettingError
+from sitl.daemon.config import Port, RunConfig, SettingError
 from sitl.daemon.loop import Loop
 from sitl.daemon.recorder import Recorder
 from sitl.daemon.udp import Sockets
@@ -40,8 +39,7 @@ def build_vehicle(config: RunConfig) -> Vehicle:
 
 
 def build_endpoint(config: RunConfig, vehicle: Vehicle) -> Endpoint:
-    peers = [(PortKind.GCS, address) for address in config.gcs_peers]
-    peers += [(PortKind.ONBOARD, address) for address in config.onboard_peers]
+    peers = [(PortKind(port.value), each) for port, addresses in config.static_peers.items() for each in addresses]
     return Endpoint(vehicle, identity=Identity(config.identity), system_id=config.system_id, static_peers=peers)
 
 
@@ -93,14 +91,16 @@ def settle_garbage() -> None:
 
 
 def banner(config: RunConfig, vehicle: Vehicle, publisher: Publisher | None, recorder: Recorder | None) -> str:
-    def target(addresses: tuple[Any, ...]) -> str:
-        return ", ".join(f"{host}:{port}" for host, port in addresses)
+    def link(port: Port) -> str:
+        host, number = config.local_ports[port]
+        return f"UDP {host}:{number} -> " + ", ".join(f"{host}:{number}" for host, number in config.static_peers[port])
 
     speed = f"{config.speed:g} x real time" if config.speed else "as fast as possible"
     lines = [
         f"vehicle {vehicle.spec.name}, instance {config.instance}, system id {config.system_id}, {speed}",
-        f"  ground stations  UDP {config.listen}:{config.local_gcs[1]} -> {target(config.gcs_peers)}",
-        f"  onboard          UDP {config.listen}:{config.local_onboard[1]} -> {target(config.onboard_peers)}",
+        f"  ground stations  {link(Port.GCS)}",
+        f"  onboard          {link(Port.ONBOARD)}",
+        *([f"  viewer           {link(Port.VIEWER)}"] if config.hil_viewer else []),
         f"  Zenoh            {zenoh_endpoint(config)}, keys yawsitter/{config.instance}/..."
         if publisher
         else "  Zenoh            off",

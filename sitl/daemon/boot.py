@@ -7,8 +7,8 @@ whoever sent them; clients repeat them.
 
 from collections.abc import Iterable
 
-from sitl.daemon.config import Address
-from sitl.daemon.udp import Port, Sockets
+from sitl.daemon.config import Address, Port
+from sitl.daemon.udp import Sockets
 from sitl.mavlink.codec import Encoder
 from sitl.mavlink.identity import COMPONENT_ID, Identity, boot_heartbeat
 

@@ -4,6 +4,7 @@ import ipaddress
 import math
 import os
 import socket
+from enum import Enum
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,12 +15,23 @@ GCS_PORT = 18570  # local ports of instance 0, and the peers they serve from the
 GCS_PEER_PORT = 14550
 ONBOARD_PORT = 14580
 ONBOARD_PEER_PORT = 14540
+ONBOARD_PEER_LAST = 14549  # shared by instance 9 and all above, as PX4's simulator does: 14550 is the ground stations'
+VIEWER_PORT = 19450  # as PX4's simulation in hardware
+VIEWER_PEER_PORT = 19410
 LOOPBACK = "127.0.0.1"
 WIND_MAX_M_S = 30.0
 GUST_MAX_M_S = 10.0
 SPEED_MAX = 1000.0
 
 Address = tuple[str, int]
+
+
+class Port(Enum):
+    """Whom a socket is for; the values are those of the link's PortKind, which this module is too light to import."""
+
+    GCS = "gcs"
+    ONBOARD = "onboard"
+    VIEWER = "viewer"
 
 
 class SettingError(ValueError):
@@ -47,27 +59,31 @@ class RunConfig(NamedTuple):
     zenoh: bool = True
     record_dir: Path | None = None
     listen: str = LOOPBACK
+    hil_viewer: bool = False
 
     @property
     def system_id(self) -> int:
         return self.instance + 1
 
     @property
-    def local_gcs(self) -> Address:
-        return self.listen, GCS_PORT + self.instance
+    def local_ports(self) -> dict[Port, Address]:
+        """What to listen on."""
+        ports = {Port.GCS: GCS_PORT, Port.ONBOARD: ONBOARD_PORT}
+        if self.hil_viewer:
+            ports[Port.VIEWER] = VIEWER_PORT
+        return {port: (self.listen, number + self.instance) for port, number in ports.items()}
 
     @property
-    def local_onboard(self) -> Address:
-        return self.listen, ONBOARD_PORT + self.instance
-
-    @property
-    def gcs_peers(self) -> tuple[Address, ...]:
-        """Ground stations that are served whether or not they were heard."""
-        return tuple(dict.fromkeys(((LOOPBACK, GCS_PEER_PORT), *self.ground_stations)))
-
-    @property
-    def onboard_peers(self) -> tuple[Address, ...]:
-        return ((LOOPBACK, ONBOARD_PEER_PORT + self.instance),)
+    def static_peers(self) -> dict[Port, tuple[Address, ...]]:
+        """Who is served whether or not it was heard."""
+        onboard = min(ONBOARD_PEER_PORT + self.instance, ONBOARD_PEER_LAST)
+        peers = {
+            Port.GCS: tuple(dict.fromkeys(((LOOPBACK, GCS_PEER_PORT), *self.ground_stations))),
+            Port.ONBOARD: ((LOOPBACK, onboard),),
+        }
+        if self.hil_viewer:
+            peers[Port.VIEWER] = ((LOOPBACK, VIEWER_PEER_PORT + self.instance),)
+        return peers
 
 
 def default_state_dir(instance: int) -> Path:

@@ -10,8 +10,9 @@ from enum import Enum
 from typing import TYPE_CHECKING
 
 from sitl.daemon.clock import SLICE_US, Lateness, Pacing
+from sitl.daemon.config import Port
 from sitl.daemon.recorder import Recorder
-from sitl.daemon.udp import Port, Sockets
+from sitl.daemon.udp import Sockets
 from sitl.mavlink.peers import PortKind
 from sitl.onboard.modes import EventKind, Severity
 from sitl.telemetry.messages import LoopMessage

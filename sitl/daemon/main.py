@@ -7,14 +7,16 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from sitl.daemon import config as settings
 from sitl.daemon.boot import Boot
 from sitl.daemon.config import RunConfig, SettingError
+from sitl.daemon.lock import StateLock
 from sitl.daemon.recorder import Recorder
-from sitl.daemon.udp import Port, Sockets
+from sitl.daemon.udp import Sockets
 from sitl.mavlink.identity import Identity
 
 if TYPE_CHECKING:
@@ -70,13 +72,13 @@ class Construction(threading.Thread):
             self.failure = failure
 
 
-def _writable(folder: Any) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise SettingError(f"--state-dir {folder}: {error.strerror}") from None
+def _locked(folder: Path) -> StateLock:
+    """The state folder as ours alone, and one that can be written to. Raises SettingError."""
+    lock = StateLock(folder)
     if not os.access(folder, os.W_OK | os.X_OK):
+        lock.close()
         raise SettingError(f"--state-dir {folder}: not writable")
+    return lock
 
 
 def main(config: RunConfig, verbose: bool = False) -> int:
@@ -87,15 +89,15 @@ def main(config: RunConfig, verbose: bool = False) -> int:
     config = settings.check(config)._replace(state_dir=config.state_dir or settings.default_state_dir(config.instance))
     stop = Stop()
     clock = wall_clock()
-    sockets = Sockets({Port.GCS: config.local_gcs, Port.ONBOARD: config.local_onboard}, config.instance)
-    peers = [(Port.GCS, address) for address in config.gcs_peers]
-    peers += [(Port.ONBOARD, address) for address in config.onboard_peers]
+    sockets = Sockets(config.local_ports, config.instance)
+    peers = [(port, address) for port, addresses in config.static_peers.items() for address in addresses]
     boot = Boot(sockets, Identity(config.identity), config.system_id, peers)
     boot.turn(clock())
-    recorder = None
+    recorder = lock = None
     construction = Construction(config)
     try:
-        _writable(config.state_dir)
+        assert config.state_dir is not None
+        lock = _locked(config.state_dir)
         if config.record_dir is not None:
             recorder = Recorder(config.record_dir, config.instance, clock())
         construction.start()
@@ -115,6 +117,8 @@ def main(config: RunConfig, verbose: bool = False) -> int:
             construction.publisher.close()
         if recorder is not None:
             recorder.close()
+        if lock is not None:
+            lock.close()
         sockets.close()
     return 0
 

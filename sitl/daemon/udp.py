@@ -1,24 +1,16 @@
-"""The two UDP sockets of a vehicle: one for ground stations, one for onboard computers. Never blocks but in `wait`."""
+"""The UDP sockets of a vehicle: for ground stations, for onboard computers, for viewers. Never blocks but in `wait`."""
 
 import contextlib
 import errno
 import select
 import socket
 from collections.abc import Iterator, Mapping
-from enum import Enum
 
-from sitl.daemon.config import Address, SettingError
+from sitl.daemon.config import Address, Port, SettingError
 
 DATAGRAMS_AT_ONCE = 32  # per socket; the loop looks at its deadline before it takes more
 _BUFFER_BYTES = 1 << 20
 _DATAGRAM_BYTES = 65535
-
-
-class Port(Enum):
-    """Whom a socket is for; the values are those of the link's PortKind, which this module is too light to import."""
-
-    GCS = "gcs"
-    ONBOARD = "onboard"
 
 
 class Sockets:

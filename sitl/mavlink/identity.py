@@ -110,6 +110,11 @@ def available_mode(index: int) -> Any:
     )
 
 
+def available_modes_monitor() -> Any:
+    """AVAILABLE_MODES_MONITOR: the list never changes, so its number doesn't either, and it is told only on request."""
+    return message("AVAILABLE_MODES_MONITOR", seq=0)
+
+
 @functools.cache
 def version() -> tuple[int, int, int]:
     """Major, minor and patch of this package; zeros when it isn't installed."""

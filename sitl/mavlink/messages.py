@@ -7,13 +7,14 @@ fields; text is bytes, arrays are spread out. Attitudes are the multicopter's (s
 import math
 from typing import Any
 
-from sitl.frames import quaternion_to_yxz, wire_quaternion, wire_rates
+from sitl.frames import wire_quaternion, wire_rates
 from sitl.geodesy import to_global
 from sitl.mavlink.codec import mav
 from sitl.mavlink.identity import MODE_CODES
 from sitl.mavlink.view import View
 from sitl.mavlink.wire import cdeg, clamped, cm_s, degE7, int16, mm, uint16
 from sitl.onboard.modes import Landed, Mode
+from sitl.quaternion import rotate_back
 
 Values = tuple[Any, ...]
 
@@ -265,21 +266,56 @@ def utm_global_position(v: View) -> Values:
 _NO_UAS_ID = (0,) * 18
 
 
-def hil_state_quaternion(v: View) -> Values:
+def odometry(v: View) -> Values:
+    """Position and attitude in world N; velocity and rates in the multicopter's body."""
     nav, a = v.s.nav, v.attitude
-    lat, lon = v.place
-    speed = cm_s(nav.v_north_m_s), cm_s(nav.v_east_m_s), cm_s(nav.v_down_m_s)
-    air = uint16(v.airspeed_m_s * 100.0)
-    force = (int16(x / 9.80665 * 1e3) for x in v.specific_force)  # mG
-    where = degE7(lat), degE7(lon), mm(v.alt_amsl_m)
+    speed = rotate_back(a.q, (nav.v_north_m_s, nav.v_east_m_s, nav.v_down_m_s))
+    where = nav.north_m, nav.east_m, nav.down_m, *a.q
+    frames = mav.MAV_FRAME_LOCAL_NED, mav.MAV_FRAME_BODY_FRD
+    motion = *speed, a.rollspeed, a.pitchspeed, a.yawspeed
+    return v.s.now_us, *where, *motion, *_NO_COVARIANCE, *frames, 0, mav.MAV_ESTIMATOR_TYPE_AUTOPILOT, 0
+
+
+_NO_COVARIANCE = (math.nan,) * 42
+
+
+def hil_state_quaternion(v: View) -> Values:
+    """The true state, as PX4's simulation in hardware shows it to viewers."""
+    x, a = v.s.truth, v.true_attitude
+    lat, lon = v.true_place
+    speed = cm_s(x.v_north_m_s), cm_s(x.v_east_m_s), cm_s(x.v_down_m_s)
+    air = uint16(v.true_airspeed_m_s * 100.0)
+    force = (int16(f / 9.80665 * 1e3) for f in v.specific_force)  # mG
+    where = degE7(lat), degE7(lon), mm(v.true_alt_amsl_m)
     return (v.s.now_us, *a.q, a.rollspeed, a.pitchspeed, a.yawspeed, *where, *speed, air, air, *force)
+
+
+def sim_state(v: View) -> Values:
+    """The true state, in full."""
+    x, a = v.s.truth, v.true_attitude
+    lat, lon = v.true_place
+    motion = *v.specific_force, a.rollspeed, a.pitchspeed, a.yawspeed
+    where = lat, lon, v.true_alt_amsl_m, 0.0, 0.0
+    speed = x.v_north_m_s, x.v_east_m_s, x.v_down_m_s
+    return *a.q, a.roll, a.pitch, a.yaw, *motion, *where, *speed, degE7(lat), degE7(lon)
 
 
 def paper_angles(v: View) -> Values:
     """The paper's φ, θ, ψ in degrees."""
-    nav = v.s.nav
-    phi, theta, psi = quaternion_to_yxz(nav.qw, nav.qx, nav.qy, nav.qz)
+    phi, theta, psi = v.paper_angles
     return v.s.now_us, math.degrees(phi), math.degrees(theta), math.degrees(psi), b"YXZ_DEG"
+
+
+def paper_phi(v: View) -> Values:
+    return v.boot_ms, math.degrees(v.paper_angles[0]), b"PHI_DEG"
+
+
+def paper_theta(v: View) -> Values:
+    return v.boot_ms, math.degrees(v.paper_angles[1]), b"THETA_DEG"
+
+
+def paper_psi(v: View) -> Values:
+    return v.boot_ms, math.degrees(v.paper_angles[2]), b"PSI_DEG"
 
 
 def thrusts(v: View) -> Values:

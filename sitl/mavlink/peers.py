@@ -6,25 +6,19 @@ takes them back to what they were before they were heard. Forgetting a peer forg
 """
 
 from collections.abc import Iterable, Iterator
-from enum import Enum
 
 from sitl.mavlink.codec import Encoder, Parser
 from sitl.mavlink.commands import Answers
 from sitl.mavlink.identity import COMPONENT_ID
 from sitl.mavlink.parameters import Listing
-from sitl.mavlink.streams import Schedule
+from sitl.mavlink.streams import PortKind, Schedule
+
+__all__ = ["Address", "Peer", "Peers", "PortKind"]
 
 Address = tuple[str, int]
 
 SILENT_S = 15.0  # wall time after which a peer is forgotten: a ground station heartbeats every second
 LEARNED_MAX = 64  # peers beyond the static ones; the one longest unheard makes way
-
-
-class PortKind(Enum):
-    """Which of the vehicle's two ports: they differ in the default rates of their streams."""
-
-    GCS = "gcs"
-    ONBOARD = "onboard"
 
 
 class Peer:
@@ -43,7 +37,7 @@ class Peer:
         self.encoder.version = 2
         self.speaks_v2 = False
         self.parser = Parser()
-        self.schedule = Schedule(self.kind is PortKind.ONBOARD, now_us)
+        self.schedule = Schedule(self.kind, now_us)
         self.listing = Listing()
         self.answers = Answers()
         self.complaints: dict[str, float] = {}  # refusals told, and when: a stream of bad targets is one text

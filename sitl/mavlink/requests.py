@@ -6,7 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 from sitl.mavlink import streams
 from sitl.mavlink.codec import Frame, by_id, by_name, mav, message
-from sitl.mavlink.identity import MODE_CODES, autopilot_version, available_mode, heartbeat, protocol_version
+from sitl.mavlink.identity import (
+    MODE_CODES,
+    autopilot_version,
+    available_mode,
+    available_modes_monitor,
+    heartbeat,
+    protocol_version,
+)
 from sitl.onboard.modes import Landed
 
 if TYPE_CHECKING:
@@ -71,6 +78,7 @@ _ONE_SHOT: dict[int, Callable[["Link", "Peer", int], list[Any]]] = {
     by_name("AUTOPILOT_VERSION").id: lambda link, _peer, _detail: [autopilot_version(link.system_id)],
     by_name("PROTOCOL_VERSION").id: lambda _link, _peer, _detail: [protocol_version()],
     by_name("AVAILABLE_MODES").id: _modes,
+    by_name("AVAILABLE_MODES_MONITOR").id: lambda _link, _peer, _detail: [available_modes_monitor()],
     by_name("MESSAGE_INTERVAL").id: _interval_of,
 }
 
@@ -83,7 +91,8 @@ def set_interval(link: "Link", peer: "Peer", message_id: float, interval_us: flo
     if not (interval_us in (streams.DEFAULT, streams.OFF) or 0.0 < interval_us <= _LONGEST_US):
         return f"An interval of {interval_us:g} us is not possible"
     microseconds = max(1, round(interval_us)) if interval_us > 0.0 else int(interval_us)
-    peer.schedule.set_interval(int(message_id), microseconds, link.vehicle.now_us)
+    if not peer.schedule.set_interval(int(message_id), microseconds, link.vehicle.now_us):
+        return f"All streams together would exceed {streams.TOTAL_MAX_HZ:g} messages a second"
     return ""
 
 

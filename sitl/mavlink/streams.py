@@ -1,12 +1,14 @@
 """Which messages flow by themselves, how often, and when the next one of each is due.
 
-Streams run on simulation time. Default rates are those of PX4's SITL on its two ports. What a peer asked for
-(SET_MESSAGE_INTERVAL, REQUEST_DATA_STREAM) is kept in its Schedule.
+Streams run on simulation time. Default rates are those of PX4's SITL on its ports: mavlink_main.cpp's normal and
+onboard modes, with what px4-rc.mavlink sets on top of them. What a peer asked for (SET_MESSAGE_INTERVAL,
+REQUEST_DATA_STREAM) is kept in its Schedule.
 """
 
 import heapq
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from enum import Enum
 from typing import NamedTuple
 
 from sitl.mavlink import messages
@@ -16,15 +18,23 @@ from sitl.mavlink.view import View
 NEVER = 1 << 62
 SHORTEST_US = 1000  # between two messages of one stream
 DEFAULT, OFF = 0, -1  # intervals with a meaning of their own in SET_MESSAGE_INTERVAL
+TOTAL_MAX_HZ = 5000.0  # messages that one peer may have streamed in a second of simulation, all streams together
+
+
+class PortKind(Enum):
+    """One of the vehicle's ports. They differ in the default rates of their streams."""
+
+    GCS = "gcs"
+    ONBOARD = "onboard"
+    VIEWER = "viewer"  # of the true state, for programs that only draw
 
 
 class Stream(NamedTuple):
-    """One message that can flow. Rates in Hz of simulation time, 0 = only when asked for."""
+    """One message that can flow. Rates in Hz of simulation time, left out = only when asked for."""
 
     definition: Definition
     values: Callable[[View], messages.Values]
-    gcs_Hz: float
-    onboard_Hz: float
+    rates_Hz: Mapping[PortKind, float]
 
     def payload(self, view: View) -> bytes:
         """Empty where the values fit no field: what a simulation that has run away has to offer."""
@@ -37,27 +47,32 @@ class Stream(NamedTuple):
 def _stream(
     name: str, gcs_Hz: float, onboard_Hz: float, values: Callable[[View], messages.Values] | None = None
 ) -> Stream:
-    return Stream(by_name(name), values or getattr(messages, name.lower()), gcs_Hz, onboard_Hz)
+    rates_Hz = {PortKind.GCS: gcs_Hz, PortKind.ONBOARD: onboard_Hz}
+    return Stream(by_name(name), values or getattr(messages, name.lower()), rates_Hz)
 
 
 STREAMS = (
     _stream("ATTITUDE", 50, 100),
     _stream("ATTITUDE_QUATERNION", 50, 50),
-    _stream("LOCAL_POSITION_NED", 30, 30),
+    _stream("LOCAL_POSITION_NED", 50, 30),
     _stream("HIGHRES_IMU", 0, 50),
+    _stream("ODOMETRY", 0, 30),
     _stream("GLOBAL_POSITION_INT", 50, 50),
     _stream("POSITION_TARGET_LOCAL_NED", 50, 10),
     _stream("POSITION_TARGET_GLOBAL_INT", 1, 10),
     _stream("ATTITUDE_TARGET", 50, 10),
-    _stream("SERVO_OUTPUT_RAW", 20, 10),
+    _stream("SERVO_OUTPUT_RAW", 50, 10),
     _stream("ACTUATOR_OUTPUT_STATUS", 0, 10),
     _stream("VFR_HUD", 4, 10),
     _stream("GPS_RAW_INT", 5, 10),
     _stream("ALTITUDE", 1, 10),
     _stream("WIND_COV", 0.5, 10),
-    _stream("DEBUG_VECT", 10, 10, messages.paper_angles),
-    _stream("DEBUG_VECT", 10, 10, messages.thrusts),
-    _stream("DEBUG_VECT", 10, 10, messages.flaps),
+    _stream("DEBUG_VECT", 1, 10, messages.paper_angles),
+    _stream("DEBUG_VECT", 1, 10, messages.thrusts),
+    _stream("DEBUG_VECT", 1, 10, messages.flaps),
+    _stream("NAMED_VALUE_FLOAT", 1, 10, messages.paper_phi),
+    _stream("NAMED_VALUE_FLOAT", 1, 10, messages.paper_theta),
+    _stream("NAMED_VALUE_FLOAT", 1, 10, messages.paper_psi),
     _stream("SYS_STATUS", 1, 5),
     _stream("EXTENDED_SYS_STATE", 1, 5),
     _stream("BATTERY_STATUS", 0.5, 0.5),
@@ -70,7 +85,8 @@ STREAMS = (
     _stream("CURRENT_MODE", 0.5, 0.5),
     _stream("SYSTEM_TIME", 1, 1),
     _stream("UTM_GLOBAL_POSITION", 0, 0),
-    _stream("HIL_STATE_QUATERNION", 0, 0),
+    _stream("SIM_STATE", 0, 0),
+    Stream(by_name("HIL_STATE_QUATERNION"), messages.hil_state_quaternion, {PortKind.VIEWER: 25}),
 )
 
 BY_ID: dict[int, tuple[int, ...]] = {
@@ -101,20 +117,17 @@ def _interval(rate_Hz: float) -> int:
     return round(1e6 / rate_Hz) if rate_Hz > 0.0 else OFF
 
 
-_DEFAULT_INTERVALS = {
-    True: [_interval(stream.onboard_Hz) for stream in STREAMS],
-    False: [_interval(stream.gcs_Hz) for stream in STREAMS],
-}
+_DEFAULT_INTERVALS = {kind: [_interval(stream.rates_Hz.get(kind, 0.0)) for stream in STREAMS] for kind in PortKind}
 
 
 class Schedule:
     """One peer's streams: a heap of (due, place in STREAMS), so that looking costs only what is due."""
 
-    __slots__ = ("_heap", "_onboard", "intervals_us", "next_us")
+    __slots__ = ("_defaults", "_heap", "intervals_us", "next_us")
 
-    def __init__(self, onboard: bool, now_us: int) -> None:
-        self._onboard = onboard
-        self.intervals_us = list(_DEFAULT_INTERVALS[onboard])
+    def __init__(self, kind: PortKind, now_us: int) -> None:
+        self._defaults = _DEFAULT_INTERVALS[kind]
+        self.intervals_us = list(self._defaults)
         self._rebuild(now_us)
 
     def _rebuild(self, now_us: int) -> None:
@@ -139,18 +152,26 @@ class Schedule:
         self.next_us = heap[0][0]
         return due
 
-    def set_interval(self, message_id: int, interval_us: int, now_us: int) -> None:
-        """Interval of a message in µs, DEFAULT or OFF; a new rate starts now. Raises KeyError for other messages."""
+    def set_interval(self, message_id: int, interval_us: int, now_us: int) -> bool:
+        """Interval of a message in µs, DEFAULT or OFF; a new rate starts now. Raises KeyError for other messages.
+
+        False, and nothing changed, where all streams together would come to more than TOTAL_MAX_HZ.
+        """
         places = BY_ID[message_id]
+        intervals_us = list(self.intervals_us)
         for k in places:
-            default = _DEFAULT_INTERVALS[self._onboard][k]
-            self.intervals_us[k] = default if interval_us == DEFAULT else max(interval_us, SHORTEST_US)
-            if interval_us == OFF:
-                self.intervals_us[k] = OFF
+            if interval_us == DEFAULT:
+                intervals_us[k] = self._defaults[k]
+            else:
+                intervals_us[k] = OFF if interval_us == OFF else max(interval_us, SHORTEST_US)
+        if sum(1e6 / each for each in intervals_us if each > 0) > TOTAL_MAX_HZ:
+            return False
+        self.intervals_us = intervals_us
         self._heap = [entry for entry in self._heap if entry[1] not in places]
-        self._heap += [(now_us, k) for k in places if self.intervals_us[k] > 0]
+        self._heap += [(now_us, k) for k in places if intervals_us[k] > 0]
         heapq.heapify(self._heap)
         self.next_us = self._heap[0][0]
+        return True
 
     def interval(self, message_id: int) -> int:
         """Interval of a message in µs, OFF if it doesn't flow. Raises KeyError for other messages."""

@@ -4,9 +4,12 @@ import math
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
+from sitl.frames import quaternion_to_yxz
 from sitl.geodesy import to_global
 from sitl.mavlink.wire import WireAttitude, body_vector_on_wire, wire_attitude
 from sitl.model.airframe import Airframe
+from sitl.model.rigid_body import State
+from sitl.navigation import NavState
 from sitl.quaternion import Quat, Vec3, rotate_back
 
 if TYPE_CHECKING:
@@ -44,9 +47,27 @@ class View:
         return wire_attitude(self.s.nav)
 
     @cached_property
+    def true_attitude(self) -> WireAttitude:
+        return wire_attitude(self.s.truth)
+
+    @cached_property
     def place(self) -> tuple[float, float]:
         """Latitude and longitude [deg]."""
         return to_global(self.s.origin, self.s.nav.north_m, self.s.nav.east_m)
+
+    @cached_property
+    def true_place(self) -> tuple[float, float]:
+        return to_global(self.s.origin, self.s.truth.north_m, self.s.truth.east_m)
+
+    @cached_property
+    def paper_angles(self) -> Vec3:
+        """The paper's φ, θ, ψ [rad]."""
+        nav = self.s.nav
+        return quaternion_to_yxz(nav.qw, nav.qx, nav.qy, nav.qz)
+
+    @property
+    def true_alt_amsl_m(self) -> float:
+        return self.s.origin.alt_amsl_m - self.s.truth.down_m
 
     @property
     def alt_amsl_m(self) -> float:
@@ -62,8 +83,15 @@ class View:
 
     @property
     def airspeed_m_s(self) -> float:
-        nav, wind = self.s.nav, self.s.wind_N
-        return math.hypot(nav.v_north_m_s - wind[0], nav.v_east_m_s - wind[1], nav.v_down_m_s - wind[2])
+        return self._speed_through_air(self.s.nav)
+
+    @property
+    def true_airspeed_m_s(self) -> float:
+        return self._speed_through_air(self.s.truth)
+
+    def _speed_through_air(self, x: NavState | State) -> float:
+        wind = self.s.wind_N
+        return math.hypot(x.v_north_m_s - wind[0], x.v_east_m_s - wind[1], x.v_down_m_s - wind[2])
 
     @cached_property
     def motors(self) -> tuple[float, float]:

@@ -10,6 +10,7 @@ import struct
 from typing import NamedTuple
 
 from sitl.frames import euler_321, wire_quaternion, wire_rates
+from sitl.model.rigid_body import State
 from sitl.navigation import NavState
 from sitl.quaternion import Quat, Vec3
 
@@ -33,8 +34,8 @@ class WireAttitude(NamedTuple):
     yawspeed: float
 
 
-def wire_attitude(nav: NavState) -> WireAttitude:
-    """The navigation state's attitude and rates as MAVLink shows them."""
+def wire_attitude(nav: NavState | State) -> WireAttitude:
+    """The attitude and rates of a navigation state, or of the plant's state, as MAVLink shows them."""
     q = wire_quaternion(nav.qw, nav.qx, nav.qy, nav.qz)
     return WireAttitude(q, *euler_321(*q), *wire_rates(nav.p_rad_s, nav.q_rad_s, nav.r_rad_s))
 

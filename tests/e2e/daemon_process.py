@@ -8,7 +8,7 @@ import struct
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 os.environ.setdefault("MAVLINK20", "1")
@@ -21,16 +21,18 @@ REPLY_LIMIT_S = 10.0
 INSTANCES = range(33, 40)  # their ports are nobody else's default
 
 
-def free_instance() -> int:
+def free_instance(among: Sequence[int] = INSTANCES) -> int:
     """An instance whose ports nobody holds."""
-    for instance in INSTANCES:
+    for instance in among:
         held = []
         try:
             for kind, port in (
                 (socket.SOCK_DGRAM, 18570),
                 (socket.SOCK_DGRAM, 14580),
-                (socket.SOCK_DGRAM, 14540),
+                (socket.SOCK_DGRAM, 19410),
+                (socket.SOCK_DGRAM, 19450),
                 (socket.SOCK_STREAM, 7447),
+                *([(socket.SOCK_DGRAM, 14540)] if instance < 9 else []),  # from there on it is shared
             ):
                 sock = socket.socket(socket.AF_INET, kind)
                 held.append(sock)

@@ -29,7 +29,7 @@ def client(daemon):
 
 
 def test_the_usual_peer_hears_boot_then_standby_without_asking(tmp_path) -> None:
-    instance = free_instance()
+    instance = free_instance(range(4, 9))
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ear:
         ear.bind(("127.0.0.1", 14540 + instance))  # where onboard programs listen
         ear.settimeout(5.0)
@@ -106,6 +106,34 @@ def test_a_second_daemon_on_the_same_ports_says_which_and_what_to_do(daemon, cli
     assert str(18570 + daemon.instance) in line
     assert f"--instance {daemon.instance + 1}" in line
     assert client.boot_ms() > 0  # the first one goes on
+
+
+def test_a_second_daemon_on_the_same_state_folder_says_so_and_the_first_goes_on(daemon, client, tmp_path) -> None:
+    with Daemon(tmp_path) as second:
+        assert second.process.wait(20) == 2
+        (line,) = second.log.splitlines()
+    assert str(daemon.state_dir) in line
+    assert f"process {daemon.process.pid}" in line
+    assert client.boot_ms() > 0
+
+
+def test_a_viewer_of_px4s_simulation_hears_the_true_state(tmp_path) -> None:
+    instance = free_instance()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ear:
+        ear.bind(("127.0.0.1", 19410 + instance))
+        ear.settimeout(BOOT_LIMIT_S)
+        with Daemon(tmp_path, "--hil-viewer", instance=instance) as daemon:
+            parser, stamps, beats = mavlink.MAVLink(None), [], 0
+            while len(stamps) < 26:
+                data, address = ear.recvfrom(65535)
+                assert address[1] == 19450 + instance, daemon.log
+                for m in parser.parse_buffer(data) or []:
+                    beats += m.get_type() == "HEARTBEAT"
+                    if m.get_type() == "HIL_STATE_QUATERNION":
+                        stamps.append(m.time_usec)
+                        assert m.attitude_quaternion == pytest.approx((1, 0, 0, 0), abs=0.1)  # upright, belly north
+    assert (stamps[-1] - stamps[0]) / 25 == pytest.approx(40_000, rel=0.05)
+    assert beats
 
 
 @pytest.mark.parametrize(

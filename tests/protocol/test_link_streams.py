@@ -1,5 +1,6 @@
 """Message rates and messages on request."""
 
+import itertools
 from collections.abc import Callable
 
 import pytest
@@ -12,17 +13,74 @@ from sitl.mavlink.streams import STREAMS
 DENIED = mav.MAV_RESULT_DENIED
 
 
-@pytest.mark.parametrize(("kind", "attitude"), [(PortKind.ONBOARD, 100), (PortKind.GCS, 50)])
-def test_default_rates_differ_by_port(world: World, kind: PortKind, attitude: int) -> None:
-    station = world.station(kind=kind)
+# Hz by name on the ground stations' and the onboard port: PX4's mavlink_main.cpp and px4-rc.mavlink
+PX4_RATES = {
+    "ATTITUDE": (50, 100),
+    "ATTITUDE_QUATERNION": (50, 50),
+    "ATTITUDE_TARGET": (50, 10),
+    "LOCAL_POSITION_NED": (50, 30),
+    "GLOBAL_POSITION_INT": (50, 50),
+    "POSITION_TARGET_LOCAL_NED": (50, 10),
+    "SERVO_OUTPUT_RAW": (50, 10),
+    "ODOMETRY": (0, 30),
+    "HIGHRES_IMU": (0, 50),
+    "VFR_HUD": (4, 10),
+    "ALTITUDE": (1, 10),
+    "SYS_STATUS": (1, 5),
+    "EXTENDED_SYS_STATE": (1, 5),
+    "NAMED_VALUE_FLOAT": (3 * 1, 3 * 10),  # three names each
+    "DEBUG_VECT": (3 * 1, 3 * 10),
+    "HIL_STATE_QUATERNION": (0, 0),
+    "SIM_STATE": (0, 0),
+    "UTM_GLOBAL_POSITION": (0, 0),
+}
+
+
+@pytest.mark.parametrize("port", [0, 1])
+def test_default_rates_are_px4s_by_port(world: World, port: int) -> None:
+    station = world.station(kind=(PortKind.GCS, PortKind.ONBOARD)[port])
     station.forget()
     world.run(4.0)
-    assert len(station.all("ATTITUDE")) == pytest.approx(4 * attitude, abs=4)
-    assert len(station.all("LOCAL_POSITION_NED")) == pytest.approx(120, abs=4)
-    for name in ("YXZ_DEG", "THRUST_N", "FLAP_DEG"):
-        assert len([m for m in station.all("DEBUG_VECT") if m.name == name]) == pytest.approx(40, abs=2)
-    assert station.all("UTM_GLOBAL_POSITION") == []
-    assert station.all("HIL_STATE_QUATERNION") == []
+    for name, rates in PX4_RATES.items():
+        assert len(station.all(name)) == pytest.approx(4 * rates[port], abs=4, rel=0.02), name
+
+
+def test_two_ground_stations_and_a_program_on_board_have_each_its_own_rates(world: World) -> None:
+    wanted = {  # Hz
+        world.station(kind=PortKind.GCS): {"ATTITUDE": 10.0, "VFR_HUD": 50.0, "GPS_RAW_INT": 20.0},
+        world.station(kind=PortKind.GCS, system=254): {"ATTITUDE": 33.0, "VFR_HUD": 5.0, "ODOMETRY": 12.0},
+        world.station(kind=PortKind.ONBOARD, system=245): {"ATTITUDE": 80.0, "VFR_HUD": 25.0, "SIM_STATE": 40.0},
+    }
+    for station, rates in wanted.items():
+        for name, rate_Hz in rates.items():
+            assert station.ask(mav.MAV_CMD_SET_MESSAGE_INTERVAL, by_name(name).id, round(1e6 / rate_Hz)) == [0]
+    for station in wanted:
+        station.forget()
+    world.run(10.0)
+    for station, rates in wanted.items():
+        for name, rate_Hz in rates.items():
+            assert len(station.all(name)) / 10.0 == pytest.approx(rate_Hz, rel=0.05), name
+        assert not station.all("COMMAND_ACK")
+        assert bool(station.all("SIM_STATE")) == ("SIM_STATE" in rates)
+        numbers = [frame.sequence for frame in station.heard]
+        assert all((b - a) % 256 == 1 for a, b in itertools.pairwise(numbers))
+
+
+def test_a_viewer_hears_heartbeats_and_the_true_state_and_no_other_stream(make_world: Callable[..., World]) -> None:
+    world = make_world(static_peers=[(PortKind.VIEWER, ("127.0.0.1", 5000))])
+    viewer = world.station(kind=PortKind.VIEWER, greeting=False)
+    world.run(4.0)
+    assert {frame.name for frame in viewer.heard} == {"HEARTBEAT", "HIL_STATE_QUATERNION"}
+    assert len(viewer.all("HIL_STATE_QUATERNION")) == pytest.approx(100, abs=2)
+
+
+def test_more_streams_than_the_loop_can_bear_are_denied(world: World) -> None:
+    station = world.station()
+    numbers = sorted({stream.definition.id for stream in STREAMS})
+    answers = [station.ask(mav.MAV_CMD_SET_MESSAGE_INTERVAL, number, 1000)[0] for number in numbers]
+    assert answers[:3] == [0, 0, 0]
+    assert answers[-3:] == [DENIED] * 3
+    assert any("messages a second" in text for text in station.texts())
 
 
 @pytest.mark.parametrize("name", sorted({stream.definition.name for stream in STREAMS}))
@@ -34,11 +92,12 @@ def test_every_stream_can_be_requested_and_set(world: World, name: str) -> None:
     world.run(0.3)
     assert station.all(name) == []
     assert station.ask(mav.MAV_CMD_REQUEST_MESSAGE, number) == [0]
-    assert len(station.all(name)) == (3 if name == "DEBUG_VECT" else 1)
+    times = 3 if name in ("DEBUG_VECT", "NAMED_VALUE_FLOAT") else 1
+    assert len(station.all(name)) == times
     assert station.ask(mav.MAV_CMD_SET_MESSAGE_INTERVAL, number, 100_000) == [0]
     station.forget()
     world.run(1.0)
-    assert len(station.all(name)) == pytest.approx(30 if name == "DEBUG_VECT" else 10, abs=3)
+    assert len(station.all(name)) == pytest.approx(10 * times, abs=3)
 
 
 def test_the_interval_in_force_is_told(world: World) -> None:
@@ -107,6 +166,7 @@ def test_connecting_ground_stations_get_what_they_ask_for_or_a_refusal(world: Wo
     assert {m.custom_mode for m in modes} == {
         196608, 33816576, 50593792, 67371008, 84148224, 100925440, 393216,
     }  # fmt: skip
+    assert station.ask(mav.MAV_CMD_REQUEST_MESSAGE, 437) == [0]  # AVAILABLE_MODES_MONITOR
     for component_metadata in (397, 395):
         assert station.ask(mav.MAV_CMD_REQUEST_MESSAGE, component_metadata) == [DENIED]
 

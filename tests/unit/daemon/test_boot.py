@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from sitl.daemon.boot import HEARTBEAT_S, Boot, is_lone_heartbeat
-from sitl.daemon.udp import Port
+from sitl.daemon.config import Port
 from sitl.mavlink.codec import Encoder, Parser, mav, message
 from sitl.mavlink.identity import Identity
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from sitl.daemon import config
-from sitl.daemon.config import RunConfig, SettingError
+from sitl.daemon.config import Port, RunConfig, SettingError
 from sitl.geodesy import GeoPoint
 
 
@@ -61,16 +61,26 @@ def test_a_setting_is_a_name_and_a_number() -> None:
 
 def test_the_ports_move_with_the_instance() -> None:
     settings = RunConfig(instance=3)
-    assert settings.local_gcs == ("127.0.0.1", 18573)
-    assert settings.local_onboard == ("127.0.0.1", 14583)
-    assert settings.gcs_peers == (("127.0.0.1", 14550),)
-    assert settings.onboard_peers == (("127.0.0.1", 14543),)
+    assert settings.local_ports == {Port.GCS: ("127.0.0.1", 18573), Port.ONBOARD: ("127.0.0.1", 14583)}
+    assert settings.static_peers == {Port.GCS: (("127.0.0.1", 14550),), Port.ONBOARD: (("127.0.0.1", 14543),)}
     assert settings.system_id == 4
+
+
+def test_no_instance_sends_to_the_ground_stations_port_what_is_meant_for_onboard_programs() -> None:
+    ports = [RunConfig(instance=i).static_peers[Port.ONBOARD][0][1] for i in range(config.INSTANCE_MAX + 1)]
+    assert ports[:10] == list(range(14540, 14550))
+    assert set(ports[10:]) == {14549}
+
+
+def test_a_viewer_has_a_port_only_when_asked_for() -> None:
+    settings = RunConfig(instance=3, hil_viewer=True)
+    assert settings.local_ports[Port.VIEWER] == ("127.0.0.1", 19453)
+    assert settings.static_peers[Port.VIEWER] == (("127.0.0.1", 19413),)
 
 
 def test_more_ground_stations_join_the_usual_one_without_doubling_it() -> None:
     more = (("127.0.0.1", 14550), ("127.0.0.1", 14999))
-    assert RunConfig(ground_stations=more).gcs_peers == more
+    assert RunConfig(ground_stations=more).static_peers[Port.GCS] == more
 
 
 def test_a_far_ground_station_needs_a_wider_ear() -> None:

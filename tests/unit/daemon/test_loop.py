@@ -6,8 +6,8 @@ from itertools import pairwise
 import pytest
 
 from sitl.daemon.clock import SLICE_US, TURN_S
+from sitl.daemon.config import Port
 from sitl.daemon.loop import QUIET_S, Ending, Loop
-from sitl.daemon.udp import Port
 from sitl.mavlink.peers import PortKind
 from sitl.onboard.events import EventLog
 from sitl.onboard.modes import EventKind

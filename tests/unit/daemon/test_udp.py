@@ -4,8 +4,8 @@ import socket
 
 import pytest
 
-from sitl.daemon.config import SettingError
-from sitl.daemon.udp import DATAGRAMS_AT_ONCE, Port, Sockets
+from sitl.daemon.config import Port, SettingError
+from sitl.daemon.udp import DATAGRAMS_AT_ONCE, Sockets
 
 
 @pytest.fixture

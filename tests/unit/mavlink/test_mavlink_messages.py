@@ -112,6 +112,34 @@ def test_debug_vectors_carry_the_papers_angles_thrusts_and_flaps() -> None:
     assert (flap.x, flap.y, flap.z) == pytest.approx((5.0, 7.0, 6.0))
 
 
+def test_named_values_carry_the_papers_angles_too() -> None:
+    named = {m.name: m.value for m in all_said("NAMED_VALUE_FLOAT")}
+    assert named == pytest.approx({"PHI_DEG": -30.0, "THETA_DEG": 90.0, "PSI_DEG": 0.0}, abs=0.01)
+
+
+def test_odometry_tells_velocity_along_the_multicopters_body() -> None:
+    m = said("ODOMETRY")
+    assert (m.frame_id, m.child_frame_id, m.estimator_type) == (1, 12, 8)
+    assert (m.x, m.y, m.z) == (100.0, 50.0, -20.0)
+    forward = 3.0 * math.cos(HEADING) + 4.0 * math.sin(HEADING)  # 30° east of north
+    assert (m.vx, m.vz) == pytest.approx((forward, -1.0), abs=1e-5)
+    assert (m.rollspeed, m.pitchspeed, m.yawspeed) == pytest.approx((0.3, 0.2, -0.1))
+    assert math.isnan(m.pose_covariance[0])
+    assert math.isnan(m.velocity_covariance[20])
+
+
+@pytest.mark.parametrize("name", ["HIL_STATE_QUATERNION", "SIM_STATE"])
+def test_viewers_and_analysts_get_the_true_state_not_the_estimate(name: str) -> None:
+    lost = said(name, nav=NAV._replace(north_m=0.0, down_m=0.0, v_north_m_s=0.0, qw=1.0, qx=0.0, qy=0.0, qz=0.0))
+    assert lost == said(name)
+    if name == "SIM_STATE":
+        assert math.degrees(lost.yaw) == pytest.approx(30.0)
+        assert (lost.vn, lost.ve, lost.vd, lost.alt) == (3.0, 4.0, -1.0, 520.0)
+    else:
+        assert lost.attitude_quaternion == pytest.approx((math.cos(HEADING / 2), 0, 0, math.sin(HEADING / 2)))
+        assert (lost.vx, lost.vy, lost.vz, lost.alt) == (300, 400, -100, 520_000)
+
+
 def test_the_inertial_sensor_reads_in_the_multicopter_frame() -> None:
     m = said("HIGHRES_IMU")
     assert (m.xacc, m.yacc, m.zacc) == pytest.approx((0.1, 0.0, -9.8))
