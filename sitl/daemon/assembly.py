@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 from sitl.daemon.boot import Boot
 from sitl.daemon.config import Port, RunConfig, SettingError
+from sitl.daemon.files import FolderArea
 from sitl.daemon.loop import Loop
 from sitl.daemon.recorder import Recorder
 from sitl.daemon.udp import Sockets
@@ -39,8 +40,16 @@ def build_vehicle(config: RunConfig) -> Vehicle:
 
 
 def build_endpoint(config: RunConfig, vehicle: Vehicle) -> Endpoint:
+    assert config.state_dir is not None
     peers = [(PortKind(port.value), each) for port, addresses in config.static_peers.items() for each in addresses]
-    return Endpoint(vehicle, identity=Identity(config.identity), system_id=config.system_id, static_peers=peers)
+    return Endpoint(
+        vehicle,
+        identity=Identity(config.identity),
+        system_id=config.system_id,
+        static_peers=peers,
+        logs=FolderArea(config.state_dir / "logs"),
+        scratch=FolderArea(config.state_dir / "scratch"),
+    )
 
 
 def open_publisher(config: RunConfig) -> Publisher | None:

@@ -176,6 +176,7 @@ ADDITIONS = {
                 "uint8_t spec_version_hash[8], uint8_t library_version_hash[8]"
             ),
         ),
+        Definition(397, "COMPONENT_METADATA", _fields("uint32_t time_boot_ms, uint32_t file_crc, char uri[100]")),
     )
 }
 """By message id; they stand in for pymavlink's definitions of the same id."""

@@ -7,8 +7,11 @@ import logging
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
+from sitl.mavlink import metadata
 from sitl.mavlink.codec import Definition, Frame, Parser, by_name, mav, message
 from sitl.mavlink.commands import CommandService
+from sitl.mavlink.files import Area, Files, MemoryArea, Mount
+from sitl.mavlink.ftp import FtpService
 from sitl.mavlink.identity import COMPONENT_ID, SIMULATOR, Identity, version
 from sitl.mavlink.link import Datagram, Link
 from sitl.mavlink.mission import MissionService
@@ -34,7 +37,8 @@ class Endpoint:
     """One vehicle on the link.
 
     system_id: MAVLink system (instance + 1); the component is the autopilot's. static_peers: served without being
-    heard. on_frame: sees the bytes of every frame, in and out (what goes to all peers alike: once).
+    heard. logs, scratch: the recorded flights, and what clients may write (None: in memory). on_frame: sees the bytes
+    of every frame, in and out (what goes to all peers alike: once).
     """
 
     def __init__(
@@ -44,6 +48,8 @@ class Endpoint:
         identity: Identity = Identity.PX4,
         system_id: int = 1,
         static_peers: Iterable[tuple[PortKind, Address]] = (),
+        logs: Area | None = None,
+        scratch: Area | None = None,
     ) -> None:
         link = self._link = Link(vehicle, identity, system_id, static_peers)
         self._vehicle = vehicle
@@ -51,6 +57,12 @@ class Endpoint:
         self._missions = MissionService(link, {mav.MAV_MISSION_TYPE_MISSION: vehicle.mission})
         self._offboard = OffboardService(link)
         self._commands = CommandService(link)
+        mounts = {
+            metadata.FOLDER: Mount(link.metadata.area, False),
+            "logs": Mount(logs or MemoryArea(), False),
+            "scratch": Mount(scratch or MemoryArea(), True),
+        }
+        self._ftp = FtpService(link, Files(mounts))
         self._handlers = self._table()
         self._event_number = vehicle.events.next_number
         self._heartbeat_due_s = float("-inf")
@@ -75,6 +87,10 @@ class Endpoint:
             "PARAM_REQUEST_LIST": p.on_list,
             "PARAM_REQUEST_READ": p.on_read,
             "PARAM_SET": p.on_set,
+            "PARAM_EXT_REQUEST_LIST": p.on_extended,
+            "PARAM_EXT_REQUEST_READ": p.on_extended,
+            "PARAM_EXT_SET": p.on_extended_set,
+            "FILE_TRANSFER_PROTOCOL": self._ftp.on_request,
             "MISSION_COUNT": m.on_count,
             "MISSION_ITEM_INT": m.on_item_int,
             "MISSION_ITEM": m.on_item,
@@ -223,9 +239,9 @@ class Endpoint:
         deadline_s = self._watch_ground_stations(now_s)
         self._missions.advance()
         self._parameters.advance()
-        self._deadline_s = min(
-            self._heartbeat_due_s, deadline_s, self._missions.deadline_s, self._parameters.deadline_s
-        )
+        self._ftp.advance()
+        services = (self._missions, self._parameters, self._ftp)
+        self._deadline_s = min(self._heartbeat_due_s, deadline_s, *(service.deadline_s for service in services))
 
     def _beat(self) -> None:
         self._heartbeat_due_s = self._link.wall_s + HEARTBEAT_S

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from sitl.mavlink.codec import Definition, message
 from sitl.mavlink.identity import Identity
+from sitl.mavlink.metadata import Metadata
 from sitl.mavlink.peers import Address, Peer, Peers, PortKind
 from sitl.mavlink.view import Craft, View
 from sitl.onboard.modes import Severity
@@ -34,6 +35,7 @@ class Link:
     ) -> None:
         self.vehicle = vehicle
         self.identity = identity
+        self.metadata = Metadata.of(vehicle.parameters)
         self.system_id: int = system_id
         self.wall_s = 0.0
         self.peers = Peers(system_id, static_peers, vehicle.now_us)

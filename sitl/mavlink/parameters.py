@@ -5,14 +5,18 @@ is always answered: PARAM_VALUE with the value in force, or PARAM_ERROR with the
 the old value where the name is known, for clients that wait for nothing else.
 
 `_HASH_CHECK` is PX4's: a checksum over all names and values that goes out ahead of the list, so that a ground station
-with a fresh copy can call the list off by writing it back.
+with a fresh copy can call the list off by writing it back. Whoever asks again while a list is under way wants the
+values: the list starts anew, without the checksum. What the vehicle changes by itself has no part in it.
+
+There are no extended parameters (PARAM_EXT_*): writing one is refused, and asking for them answered by a text.
 """
 
 import struct
-import zlib
 from typing import TYPE_CHECKING, Any
 
 from sitl.mavlink.codec import Frame, by_name, mav, message
+from sitl.mavlink.ftp_payload import crc32
+from sitl.mavlink.pace import Pace
 from sitl.onboard.modes import Event
 from sitl.onboard.parameters import ParameterRefusal
 
@@ -22,7 +26,7 @@ if TYPE_CHECKING:
 
 HASH_CHECK = "_HASH_CHECK"
 LIST_BURST = 20  # values of a list that go out at once
-LIST_RATE_HZ = 500.0  # values a second of wall time beyond the burst
+LIST_RATE_HZ = 1000.0  # values a second of wall time beyond the burst
 _HASH_PLACE = -1  # in a list: ahead of the first value
 _NO_INDEX = 0xFFFF
 
@@ -44,22 +48,15 @@ _ERRORS = {
 class Listing:
     """Where one peer's list stands."""
 
-    __slots__ = ("allowance", "next", "paced_s")
+    __slots__ = ("next", "pace")
 
     def __init__(self) -> None:
         self.next: int | None = None
-        self.allowance = 0.0
-        self.paced_s = 0.0
+        self.pace = Pace(LIST_RATE_HZ, LIST_BURST)
 
-    def start(self, wall_s: float) -> None:
-        """From the top, also if it was under way."""
-        self.next, self.allowance, self.paced_s = _HASH_PLACE, float(LIST_BURST), wall_s
-
-    def grant(self, wall_s: float) -> int:
-        """How many values may go out now."""
-        self.allowance = min(LIST_BURST, self.allowance + (wall_s - self.paced_s) * LIST_RATE_HZ)
-        self.paced_s = wall_s
-        return int(self.allowance)
+    def start(self) -> None:
+        """From the top, or from the first value if it was under way."""
+        self.next = _HASH_PLACE if self.next is None else 0
 
 
 class ParameterService:
@@ -78,7 +75,7 @@ class ParameterService:
         return self._link.wall_s + 0.01 if self._listing else float("inf")
 
     def on_list(self, peer: "Peer", frame: Frame) -> None:
-        peer.listing.start(self._link.wall_s)
+        peer.listing.start()
         if peer not in self._listing:
             self._listing.append(peer)
 
@@ -111,6 +108,16 @@ class ParameterService:
         if refusal is not ParameterRefusal.UNKNOWN:
             self._send_value(peer, name)
 
+    def on_extended(self, peer: "Peer", frame: Frame) -> None:
+        self._link.complain(peer, "There are no extended parameters: use PARAM_REQUEST_LIST")
+
+    def on_extended_set(self, peer: "Peer", frame: Frame) -> None:
+        m = frame.message
+        result = mav.PARAM_ACK_VALUE_UNSUPPORTED
+        self._link.send(
+            peer, message("PARAM_EXT_ACK", param_id=m.param_id, param_type=m.param_type, param_result=result)
+        )
+
     def _set(self, peer: "Peer", name: str, value: float, *, is_int: bool) -> ParameterRefusal | None:
         events = self._link.vehicle.events
         first = events.next_number
@@ -135,12 +142,12 @@ class ParameterService:
         listing, names = peer.listing, self._parameters.names
         if listing.next is None or peer not in self._link.peers:
             return False
-        for _ in range(listing.grant(self._link.wall_s)):
+        for _ in range(int(listing.pace.refill(self._link.wall_s))):
             if listing.next == _HASH_PLACE:
                 self._send_hash(peer)
             else:
                 self._send_value(peer, names[listing.next])
-            listing.allowance -= 1.0
+            listing.pace.allowance -= 1.0
             listing.next += 1
             if listing.next >= len(names):
                 listing.next = None
@@ -165,14 +172,16 @@ class ParameterService:
         self._link.send_packed(peer, _VALUE, payload.rstrip(b"\0"))
 
     def checksum(self) -> int:
-        """PX4's: CRC-32 without inversions over each name and the four bytes of its value, in order of the names."""
+        """PX4's: over each name and the four bytes of its value, in order of the names."""
         p = self._parameters
         if self._hash[0] != p.generation:
-            crc = 0xFFFFFFFF
+            crc = 0
             for name in p.names:
-                value = struct.pack("<i", int(p[name])) if p.declaration(name).is_int else struct.pack("<f", p[name])
-                crc = zlib.crc32(name.encode() + value, crc)
-            self._hash = (p.generation, crc ^ 0xFFFFFFFF)
+                d = p.declaration(name)
+                if not d.volatile:
+                    value = struct.pack("<i", int(p[name])) if d.is_int else struct.pack("<f", p[name])
+                    crc = crc32(name.encode() + value, crc)
+            self._hash = (p.generation, crc)
         return self._hash[1]
 
     def _send_error(self, peer: "Peer", frame: Frame, name: str, index: int, refusal: ParameterRefusal) -> None:

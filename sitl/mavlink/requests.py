@@ -73,6 +73,10 @@ def _interval_of(_link: "Link", peer: "Peer", message_id: int) -> list[Any]:
     return [message("MESSAGE_INTERVAL", message_id=message_id & 0xFFFF, interval_us=interval)]
 
 
+def _metadata(link: "Link", _peer: "Peer", _detail: int) -> list[Any]:
+    return [link.metadata.message(link.vehicle.now_us)]
+
+
 _ONE_SHOT: dict[int, Callable[["Link", "Peer", int], list[Any]]] = {
     by_name("HEARTBEAT").id: lambda link, _peer, _detail: [vehicle_heartbeat(link)],
     by_name("AUTOPILOT_VERSION").id: lambda link, _peer, _detail: [autopilot_version(link.system_id)],
@@ -80,6 +84,7 @@ _ONE_SHOT: dict[int, Callable[["Link", "Peer", int], list[Any]]] = {
     by_name("AVAILABLE_MODES").id: _modes,
     by_name("AVAILABLE_MODES_MONITOR").id: lambda _link, _peer, _detail: [available_modes_monitor()],
     by_name("MESSAGE_INTERVAL").id: _interval_of,
+    by_name("COMPONENT_METADATA").id: _metadata,
 }
 
 

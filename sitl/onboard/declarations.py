@@ -112,7 +112,7 @@ _TABLE = (
     Declaration("SIM_PAUSE", True, 0, 0, 1, "", "Simulation", "Simulation stands still", values=_OFF_ON,
                 persistent=False),
     Declaration("SIM_STEP_MS", True, 0, 0, 60000, "ms", "Simulation", "While paused: run on by so much, then reads 0",
-                persistent=False),
+                persistent=False, volatile=True),
     _real("SIM_WIND_N", 0.0, -30.0, 30.0, "m/s", "Simulation", "Wind: the air's motion to the north", kept=False),
     _real("SIM_WIND_E", 0.0, -30.0, 30.0, "m/s", "Simulation", "Wind: the air's motion to the east", kept=False),
     _real("SIM_WIND_D", 0.0, -30.0, 30.0, "m/s", "Simulation", "Wind: the air's motion downward", kept=False),

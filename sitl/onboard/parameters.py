@@ -30,6 +30,7 @@ class Declaration(NamedTuple):
     values: tuple[tuple[int, str], ...] = ()
     read_only: bool = False
     persistent: bool = True
+    volatile: bool = False  # the vehicle changes it by itself
 
 
 class ParameterRefusal(Enum):

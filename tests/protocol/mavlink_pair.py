@@ -7,6 +7,7 @@ import random
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from gcs_tools.client import Client, Script
 from sitl.mavlink.codec import Encoder, Frame, Parser, mav, message
 from sitl.mavlink.endpoint import Datagram, Endpoint, Identity, PortKind
 from sitl.onboard.mission import MissionItem
@@ -122,9 +123,10 @@ class World:
         static_peers: Sequence[tuple[PortKind, tuple[str, int]]] = (),
         speed: float = 1.0,
         vehicle: Any = None,
+        **options: Any,
     ) -> None:
         self.vehicle = vehicle or Vehicle(spec)
-        self.endpoint = Endpoint(self.vehicle, identity=identity, static_peers=static_peers)
+        self.endpoint = Endpoint(self.vehicle, identity=identity, static_peers=static_peers, **options)
         self.stations: list[Station] = []
         self.wall_s = 0.0
         self.speed = speed
@@ -166,6 +168,21 @@ class World:
             assert self.wall_s - start_s < limit_s, f"not within {limit_s} s"
             self.step()
         return self.wall_s - start_s
+
+    def converse(self, station: Station, talk: Callable[[Client], Script[Any]], limit_s: float) -> Any:
+        """Run a script of the tools' own client over a station's wires; its result, or its fault raised."""
+        client = Client(1)
+        station.take = lambda data: client.receive(data, self.wall_s)  # type: ignore[method-assign]
+        client.start(talk(client))
+        start_s = self.wall_s
+        while not client.finished:
+            assert self.wall_s - start_s < limit_s, f"not within {limit_s} s"
+            for data in client.poll(self.wall_s):
+                station.send_bytes(data)
+            self.step()
+        if client.fault is not None:
+            raise client.fault
+        return client.result
 
     def take_off(self, station: Station, height_m: float = 2.0) -> None:
         """Into the air and to Hold."""

@@ -154,7 +154,7 @@ def test_connecting_ground_stations_get_what_they_ask_for_or_a_refusal(world: Wo
     assert version.vendor_id != 0
     assert version.capabilities & mav.MAV_PROTOCOL_CAPABILITY_MISSION_INT
     assert version.capabilities & mav.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
-    assert not version.capabilities & mav.MAV_PROTOCOL_CAPABILITY_FTP
+    assert version.capabilities & mav.MAV_PROTOCOL_CAPABILITY_FTP
     assert not version.capabilities & mav.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
     assert not version.capabilities & mav.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET
     assert station.ask(mav.MAV_CMD_REQUEST_MESSAGE, 300) == [0]
@@ -167,8 +167,9 @@ def test_connecting_ground_stations_get_what_they_ask_for_or_a_refusal(world: Wo
         196608, 33816576, 50593792, 67371008, 84148224, 100925440, 393216,
     }  # fmt: skip
     assert station.ask(mav.MAV_CMD_REQUEST_MESSAGE, 437) == [0]  # AVAILABLE_MODES_MONITOR
-    for component_metadata in (397, 395):
-        assert station.ask(mav.MAV_CMD_REQUEST_MESSAGE, component_metadata) == [DENIED]
+    assert station.ask(mav.MAV_CMD_REQUEST_MESSAGE, 397) == [0]
+    assert station.all("COMPONENT_METADATA")[0].uri.startswith("mftp://")
+    assert station.ask(mav.MAV_CMD_REQUEST_MESSAGE, 395) == [DENIED]  # COMPONENT_INFORMATION, its forerunner
 
 
 def test_one_mode_may_be_asked_for_alone_and_no_mode_that_is_not_there(world: World) -> None:
