@@ -228,6 +228,15 @@ def _parser() -> argparse.ArgumentParser:
         action="store_true",
         help="send HEARTBEAT and HIL_STATE_QUATERNION (25 Hz, true state) to 127.0.0.1:19410+I for jMAVSim or Hawkeye",
     )
+    run.add_argument(
+        "--signing-key",
+        type=Path,
+        metavar="FILE",
+        help="sign every message and take none that isn't signed with this key: 32 bytes, or 64 hexadecimal digits",
+    )
+    run.add_argument(
+        "--forward", action="store_true", help="pass messages on between peers, as MAVLink's routing rules have it"
+    )
     run.add_argument("--record", type=Path, metavar="DIR", help="keep every MAVLink frame in DIR, as a new .tlog")
     run.add_argument("--verbose", action="store_true", help="log more")
 
@@ -267,6 +276,8 @@ def _run(args: argparse.Namespace) -> int:
         record_dir=args.record,
         listen=args.listen,
         hil_viewer=args.hil_viewer,
+        signing_key=args.signing_key,
+        forward=args.forward,
     )
     return daemon.main(settings, verbose=args.verbose)
 

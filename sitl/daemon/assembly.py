@@ -11,7 +11,9 @@ from sitl.daemon.recorder import Recorder
 from sitl.daemon.udp import Sockets
 from sitl.mavlink.endpoint import Endpoint
 from sitl.mavlink.identity import Identity
+from sitl.mavlink.limits import DAEMON
 from sitl.mavlink.peers import PortKind
+from sitl.mavlink.signing import Signer
 from sitl.onboard.store import FolderStore
 from sitl.strict_yaml import ConfigError
 from sitl.telemetry import keys
@@ -39,7 +41,7 @@ def build_vehicle(config: RunConfig) -> Vehicle:
         raise SettingError(str(error)) from None
 
 
-def build_endpoint(config: RunConfig, vehicle: Vehicle) -> Endpoint:
+def build_endpoint(config: RunConfig, vehicle: Vehicle, signer: Signer | None) -> Endpoint:
     assert config.state_dir is not None
     peers = [(PortKind(port.value), each) for port, addresses in config.static_peers.items() for each in addresses]
     return Endpoint(
@@ -49,6 +51,9 @@ def build_endpoint(config: RunConfig, vehicle: Vehicle) -> Endpoint:
         static_peers=peers,
         logs=FolderArea(config.state_dir / "logs"),
         scratch=FolderArea(config.state_dir / "scratch"),
+        limits=DAEMON,
+        signer=signer,
+        forward=config.forward,
     )
 
 
@@ -73,9 +78,10 @@ def build_loop(
     publisher: Publisher | None,
     recorder: Recorder | None,
     clock: Callable[[], float],
+    signer: Signer | None = None,
 ) -> tuple[Loop, Endpoint]:
     """The loop with everything attached, and each function in it run once so that none compiles in flight."""
-    endpoint = build_endpoint(config, vehicle)
+    endpoint = build_endpoint(config, vehicle, signer)
     loop = Loop(vehicle, endpoint, sockets, clock, publisher=publisher, recorder=recorder)
     feed = Feed(vehicle, config.instance, loop.figures)
     for topic in keys.TOPICS:
@@ -114,6 +120,8 @@ def banner(config: RunConfig, vehicle: Vehicle, publisher: Publisher | None, rec
         if publisher
         else "  Zenoh            off",
         f"  state            {config.state_dir}",
+        *([f"  signing key      {config.signing_key}"] if config.signing_key else []),
+        *(["  forwarding       between all peers"] if config.forward else []),
     ]
     if recorder is not None:
         lines.append(f"  recording        {recorder.path}")

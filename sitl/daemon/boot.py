@@ -11,6 +11,7 @@ from sitl.daemon.config import Address, Port
 from sitl.daemon.udp import Sockets
 from sitl.mavlink.codec import Encoder
 from sitl.mavlink.identity import COMPONENT_ID, Identity, boot_heartbeat
+from sitl.mavlink.signing import SIGNATURE_BYTES, Signer, is_signed
 
 HEARTBEAT_S = 1.0
 HEARD_MAX = 16
@@ -18,31 +19,41 @@ _HEARTBEAT_BYTES = 21  # header 10, payload 9, checksum 2
 
 
 def is_lone_heartbeat(data: bytes) -> bool:
-    """Whether a datagram is one MAVLink 2 HEARTBEAT and nothing else."""
-    return len(data) == _HEARTBEAT_BYTES and data[0] == 0xFD and data[7:10] == b"\0\0\0"
+    """Whether a datagram is one MAVLink 2 HEARTBEAT, signed or not, and nothing else."""
+    if len(data) not in (_HEARTBEAT_BYTES, _HEARTBEAT_BYTES + SIGNATURE_BYTES) or data[0] != 0xFD:
+        return False
+    return data[7:10] == b"\0\0\0" and is_signed(data) == (len(data) > _HEARTBEAT_BYTES)
 
 
 class Boot:
     """Heartbeats to the static peers and to whoever has written."""
 
     def __init__(
-        self, sockets: Sockets, identity: Identity, system_id: int, peers: Iterable[tuple[Port, Address]]
+        self,
+        sockets: Sockets,
+        identity: Identity,
+        system_id: int,
+        peers: Iterable[tuple[Port, Address]],
+        signer: Signer | None = None,
     ) -> None:
         self.heard: dict[tuple[Port, Address], bytes] = {}  # the last lone HEARTBEAT of each, for the vehicle to learn
         self._sockets = sockets
         self._message = boot_heartbeat(identity)
         self._system_id = system_id
-        self._encoders = {peer: Encoder(system_id, COMPONENT_ID) for peer in peers}
+        self._signer = signer
+        self._encoders = {peer: Encoder(system_id, COMPONENT_ID, signer) for peer in peers}
         self._due_s = float("-inf")
 
     def turn(self, wall_s: float) -> None:
         """Read what is there; heartbeat to everyone when it is time, and at once to a newcomer."""
+        if self._signer is not None:
+            self._signer.keep_time(wall_s)
         for port, address, data in self._sockets.receive():
             if not is_lone_heartbeat(data) or len(self.heard) >= HEARD_MAX:
                 continue
             self.heard[port, address] = data
             if (port, address) not in self._encoders:
-                self._encoders[port, address] = Encoder(self._system_id, COMPONENT_ID)
+                self._encoders[port, address] = Encoder(self._system_id, COMPONENT_ID, self._signer)
                 self._send((port, address))
         if wall_s >= self._due_s:
             self._due_s = wall_s + HEARTBEAT_S

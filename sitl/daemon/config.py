@@ -60,6 +60,8 @@ class RunConfig(NamedTuple):
     record_dir: Path | None = None
     listen: str = LOOPBACK
     hil_viewer: bool = False
+    signing_key: Path | None = None  # the file
+    forward: bool = False
 
     @property
     def system_id(self) -> int:

@@ -129,7 +129,7 @@ class Loop:
 
     def figures(self) -> LoopMessage:
         """How the loop is doing."""
-        p = self._publisher
+        p, e = self._publisher, self._endpoint
         return LoopMessage(
             now_us=self._vehicle.now_us,
             up_wall_s=self._clock() - self._start_s,
@@ -141,7 +141,12 @@ class Loop:
             datagrams_in=self._sockets.received,
             datagrams_out=self._sockets.sent,
             datagrams_dropped=self._sockets.dropped,
-            faults=self.faults + self._endpoint.faults,
+            datagrams_refused=e.refused,
+            datagrams_unreadable=e.unreadable,
+            frames_unauthentic=e.unauthentic,
+            frames_forwarded=e.forwarded,
+            peers=len(e.peers),
+            faults=self.faults + e.faults,
             telemetry_messages=p.messages if p else 0,
             telemetry_busy_ms=p.busy_s * 1e3 if p else 0.0,
             telemetry_worst_ms=p.worst_s * 1e3 if p else 0.0,

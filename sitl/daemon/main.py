@@ -18,6 +18,8 @@ from sitl.daemon.lock import StateLock
 from sitl.daemon.recorder import Recorder
 from sitl.daemon.udp import Sockets
 from sitl.mavlink.identity import Identity
+from sitl.mavlink.signing import KeyFileError, Signer, after_restart, read_key
+from sitl.onboard.store import FolderStore, Store
 
 if TYPE_CHECKING:
     from sitl.telemetry.publisher import Publisher
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
 log = logging.getLogger("sitl")
 
 BOOT_TURN_S = 0.02
+STAMP_FILE = "signing-stamp"
 
 
 def wall_clock() -> Callable[[], float]:
@@ -81,6 +84,25 @@ def _locked(folder: Path) -> StateLock:
     return lock
 
 
+def _signer(config: RunConfig, store: Store) -> Signer | None:
+    """The key of the settings, if they have one, with the stamp that its last use came to. Raises SettingError."""
+    if config.signing_key is None:
+        return None
+    try:
+        key = read_key(config.signing_key)
+    except KeyFileError as error:
+        raise SettingError(f"--signing-key {error}") from None
+
+    def save(stamp: int) -> None:
+        try:
+            store.write(STAMP_FILE, b"%d\n" % stamp)
+        except OSError as error:
+            log.error("the signatures' time stamp is not saved: %s", error.strerror)
+
+    saved = store.read(STAMP_FILE) or b""
+    return Signer(key, after_restart(int(saved)) if saved.strip().isdigit() else 0, save)
+
+
 def main(config: RunConfig, verbose: bool = False) -> int:
     """Run until told to stop; returns the exit status. Raises SettingError for settings that can't be used."""
     logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", level=logging.INFO, stream=sys.stderr)
@@ -89,14 +111,15 @@ def main(config: RunConfig, verbose: bool = False) -> int:
     config = settings.check(config)._replace(state_dir=config.state_dir or settings.default_state_dir(config.instance))
     stop = Stop()
     clock = wall_clock()
+    assert config.state_dir is not None
+    signer = _signer(config, FolderStore(config.state_dir))
     sockets = Sockets(config.local_ports, config.instance)
     peers = [(port, address) for port, addresses in config.static_peers.items() for address in addresses]
-    boot = Boot(sockets, Identity(config.identity), config.system_id, peers)
+    boot = Boot(sockets, Identity(config.identity), config.system_id, peers, signer)
     boot.turn(clock())
     recorder = lock = None
     construction = Construction(config)
     try:
-        assert config.state_dir is not None
         lock = _locked(config.state_dir)
         if config.record_dir is not None:
             recorder = Recorder(config.record_dir, config.instance, clock())
@@ -111,7 +134,7 @@ def main(config: RunConfig, verbose: bool = False) -> int:
         if construction.failure is not None:
             raise construction.failure
         assert construction.vehicle is not None
-        _fly(config, construction.vehicle, construction.publisher, sockets, recorder, boot, stop, clock)
+        _fly(config, construction.vehicle, construction.publisher, sockets, recorder, boot, stop, clock, signer)
     finally:
         if construction.publisher is not None:
             construction.publisher.close()
@@ -132,6 +155,7 @@ def _fly(
     boot: Boot,
     stop: Stop,
     clock: Callable[[], float],
+    signer: Signer | None,
 ) -> None:
     """The loop, again for each reboot, until it ends."""
     from sitl.daemon import assembly
@@ -139,7 +163,7 @@ def _fly(
 
     log.info("%s", assembly.banner(config, vehicle, publisher, recorder))
     while True:
-        loop, endpoint = assembly.build_loop(config, vehicle, sockets, publisher, recorder, clock)
+        loop, endpoint = assembly.build_loop(config, vehicle, sockets, publisher, recorder, clock, signer)
         assembly.introduce(endpoint, boot, clock())
         boot.heard.clear()
         assembly.settle_garbage()

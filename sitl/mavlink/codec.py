@@ -17,12 +17,12 @@ from fastcrc import crc16
 from pymavlink.dialects.v20 import development as mav
 
 from sitl.mavlink.dialect import ADDITIONS, Definition, Field, split_extensions
+from sitl.mavlink.signing import SIGNATURE_BYTES, Signer
 
 __all__ = ["Definition", "Encoder", "Frame", "Parser", "by_id", "by_name", "mav", "message"]
 
 _V1, _V2 = 0xFE, 0xFD
-_SIGNED = 0x01  # incompatibility flag: a signature of 13 bytes follows the checksum
-_SIGNATURE = 13
+_SIGNED = 0x01  # incompatibility flag: a signature follows the checksum
 _PENDING = 600  # bytes of an unfinished frame worth keeping (the longest frame has 280)
 
 _HEAD_V1 = struct.Struct("<BBBBB")  # length, sequence, system, component, id
@@ -89,15 +89,17 @@ def _from_pymavlink(layout: Any) -> Definition:
 
 
 class Encoder:
-    """Frames for one peer: it numbers them, and knows which framing the peer understands."""
+    """Frames for one peer: it numbers them, signs them, and knows which framing the peer understands."""
 
-    __slots__ = ("component", "sequence", "system", "version")
+    __slots__ = ("_link_number", "component", "sequence", "signer", "system", "version")
 
-    def __init__(self, system: int, component: int) -> None:
+    def __init__(self, system: int, component: int, signer: Signer | None = None, link_number: int = 0) -> None:
         self.system = system
         self.component = component
+        self.signer = signer
         self.sequence = 0
         self.version = 2
+        self._link_number = link_number
 
     def carries(self, definition: Definition) -> bool:
         """Whether the framing has room for this message's id: version 1 ends at 255."""
@@ -116,12 +118,12 @@ class Encoder:
             payload = payload.ljust(definition.base_length, b"\0")[: definition.base_length]
             body = _HEAD_V1.pack(len(payload), number, self.system, self.component, definition.id) + payload
             return b"\xfe" + body + _CRC.pack(_crc(body + definition.crc_extra))
-        identity = definition.id
-        body = (
-            _HEAD_V2.pack(len(payload), 0, 0, number, self.system, self.component, identity & 0xFFFF, identity >> 16)
-            + payload
-        )
-        return b"\xfd" + body + _CRC.pack(_crc(body + definition.crc_extra))
+        identity, signer = definition.id, self.signer
+        flags = 0 if signer is None else _SIGNED
+        low, high = identity & 0xFFFF, identity >> 16
+        body = _HEAD_V2.pack(len(payload), flags, 0, number, self.system, self.component, low, high) + payload
+        frame = b"\xfd" + body + _CRC.pack(_crc(body + definition.crc_extra))
+        return frame if signer is None else frame + signer.signature(frame, self._link_number)
 
 
 class Parser:
@@ -185,7 +187,7 @@ def _frame_length(data: bytes, position: int) -> int:
     magic = data[position]
     if magic == _V2 and position + 3 <= len(data):
         flags = data[position + 2]
-        return data[position + 1] + 12 + (_SIGNATURE if flags & _SIGNED else 0) if not flags & ~_SIGNED else 0
+        return data[position + 1] + 12 + (SIGNATURE_BYTES if flags & _SIGNED else 0) if not flags & ~_SIGNED else 0
     if magic == _V1 and position + 2 <= len(data):
         return data[position + 1] + 8
     return 0

@@ -8,17 +8,20 @@ from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 from sitl.mavlink import metadata
-from sitl.mavlink.codec import Definition, Frame, Parser, by_name, mav, message
+from sitl.mavlink.codec import Frame, Parser, by_name, mav, message
 from sitl.mavlink.commands import CommandService
 from sitl.mavlink.files import Area, Files, MemoryArea, Mount
 from sitl.mavlink.ftp import FtpService
 from sitl.mavlink.identity import COMPONENT_ID, SIMULATOR, Identity, version
+from sitl.mavlink.limits import UNLIMITED, Allowance, Limits, cost
 from sitl.mavlink.link import Datagram, Link
 from sitl.mavlink.mission import MissionService
 from sitl.mavlink.offboard import OffboardService
 from sitl.mavlink.parameters import ParameterService
 from sitl.mavlink.peers import Address, Peer, PortKind
 from sitl.mavlink.requests import on_request_data_stream, vehicle_heartbeat
+from sitl.mavlink.routing import Router, target_places
+from sitl.mavlink.signing import Signer, is_signed
 from sitl.mavlink.streams import BY_ID, NEVER, STREAMS
 from sitl.onboard.modes import Event, EventKind, Severity
 
@@ -30,6 +33,8 @@ __all__ = ["Address", "Datagram", "Endpoint", "Identity", "PortKind"]
 log = logging.getLogger(__name__)
 
 HEARTBEAT_S = 1.0
+REFUSALS_TOLD_S = 10.0  # wall time between two lines in the log about refused datagrams
+_SETUP_SIGNING = by_name("SETUP_SIGNING").id
 Handler = Callable[[Peer, Frame], None]
 
 
@@ -38,7 +43,8 @@ class Endpoint:
 
     system_id: MAVLink system (instance + 1); the component is the autopilot's. static_peers: served without being
     heard. logs, scratch: the recorded flights, and what clients may write (None: in memory). on_frame: sees the bytes
-    of every frame, in and out (what goes to all peers alike: once).
+    of every frame, in and out (what goes to all peers alike: once). limits: what peers may send. signer: signs what
+    goes out, and what comes in must be signed. forward: pass messages on between peers.
     """
 
     def __init__(
@@ -50,8 +56,11 @@ class Endpoint:
         static_peers: Iterable[tuple[PortKind, Address]] = (),
         logs: Area | None = None,
         scratch: Area | None = None,
+        limits: Limits = UNLIMITED,
+        signer: Signer | None = None,
+        forward: bool = False,
     ) -> None:
-        link = self._link = Link(vehicle, identity, system_id, static_peers)
+        link = self._link = Link(vehicle, identity, system_id, static_peers, limits, signer)
         self._vehicle = vehicle
         self._parameters = ParameterService(link)
         self._missions = MissionService(link, {mav.MAV_MISSION_TYPE_MISSION: vehicle.mission})
@@ -71,7 +80,13 @@ class Endpoint:
         self._deadline_s = float("-inf")
         self._stream_due_us = 0
         self._streamed_us = 0
+        self._strangers = Allowance(limits.strangers_Hz, limits.strangers_burst)
+        self._router = Router(link) if forward else None
+        self._refused_told = (0, float("-inf"))
         self.faults = 0  # frames whose handling failed: a mistake in this program, logged
+        self.refused = 0  # datagrams beyond their sender's allowance, or of one peer too many
+        self.unreadable = 0  # datagrams that held no sound frame
+        self.unauthentic = 0  # frames that were not signed, not well, or not for the first time
 
     def _table(self) -> dict[int, tuple[Handler, int, int]]:
         """Handlers by message id, with the places of target_system and target_component (−1: it has none)."""
@@ -83,6 +98,7 @@ class Endpoint:
             "COMMAND_LONG": c.on_long,
             "COMMAND_INT": c.on_int,
             "SET_MODE": c.on_set_mode,
+            "SETUP_SIGNING": self._on_setup_signing,
             "REQUEST_DATA_STREAM": lambda peer, frame: on_request_data_stream(self._link, peer, frame),
             "PARAM_REQUEST_LIST": p.on_list,
             "PARAM_REQUEST_READ": p.on_read,
@@ -110,7 +126,7 @@ class Endpoint:
         table = {}
         for name, handler in handlers.items():
             definition = by_name(name)
-            table[definition.id] = (handler, *_target_places(definition))
+            table[definition.id] = (handler, *target_places(definition.id))
         return table
 
     # --- in
@@ -120,23 +136,43 @@ class Endpoint:
         link = self._link
         link.wall_s = wall_s
         peer = link.peers.find(kind, address)
+        allowance = peer.allowance if peer is not None else self._strangers
+        if not allowance.take(wall_s):
+            self.refused += 1
+            return
         parser = peer.parser if peer is not None else Parser()
-        for frame in parser.feed(data):
+        frames = parser.feed(data)
+        allowance.charge(cost(data, len(frames)) - 1)
+        if not frames:
+            self.unreadable += 1
+        for frame in frames:
             if frame.system == link.system_id and frame.component == COMPONENT_ID:
                 continue  # our own, come back over some loop
+            if link.signer is not None and not self._is_authentic(link.signer, frame):
+                self.unauthentic += 1
+                continue
             if peer is None:
-                peer = link.peers.learn(kind, address, self._vehicle.now_us)
+                peer = link.peers.learn(kind, address, wall_s, self._vehicle.now_us)
+                if peer is None:
+                    self.refused += 1
+                    return
                 peer.parser = parser
                 self._stream_due_us = 0
             if peer.hear(frame.version, wall_s):
                 self._greet(peer)
-            if link.on_frame is not None:
+            if link.on_frame is not None and frame.id != _SETUP_SIGNING:
                 link.on_frame(frame.raw, False)
+            if self._router is not None:
+                self._router.take(peer, frame)
             try:
                 self._dispatch(peer, frame)
             except Exception:
                 self.faults += 1
                 log.exception("handling %s failed", frame.name)
+
+    def _is_authentic(self, signer: Signer, frame: Frame) -> bool:
+        signer.keep_time(self._link.wall_s)
+        return signer.admits(frame.raw, frame.id, frame.system, frame.component)
 
     def _dispatch(self, peer: Peer, frame: Frame) -> None:
         entry = self._handlers.get(frame.id)
@@ -158,11 +194,17 @@ class Endpoint:
         self._link.tell(peer, Severity.INFO, text)
 
     def _on_heartbeat(self, _peer: Peer, frame: Frame) -> None:
-        if frame.message.type == mav.MAV_TYPE_GCS:
+        """A ground station that has no key doesn't hold off the failsafe."""
+        trusted = self._link.signer is None or is_signed(frame.raw)
+        if frame.message.type == mav.MAV_TYPE_GCS and trusted:
             self._gcs_heard_s = self._link.wall_s
             if self._gcs_lost:
                 self._gcs_lost = False
                 self._vehicle.commander.link_lost(False)
+
+    def _on_setup_signing(self, peer: Peer, _frame: Frame) -> None:
+        """The guide has a key sent only over a link that nobody else can hear, which a UDP port is not."""
+        self._link.complain(peer, "Signing keys are set with --signing-key FILE, not over the link")
 
     def _on_ping(self, peer: Peer, frame: Frame) -> None:
         m = frame.message
@@ -188,6 +230,8 @@ class Endpoint:
         """All that is due now. Call it after `receive` and whenever simulation time has moved."""
         link, vehicle = self._link, self._vehicle
         link.wall_s = wall_s
+        if link.signer is not None:
+            link.signer.keep_time(wall_s)
         if vehicle.events.next_number != self._event_number:
             self._tell_events()
         if wall_s >= self._deadline_s:
@@ -235,6 +279,7 @@ class Endpoint:
         if now_s >= self._heartbeat_due_s:
             link.peers.forget_silent(now_s, self._vehicle.now_us)
             self._stream_due_us = 0
+            self._tell_refusals(now_s)
             self._beat()
         deadline_s = self._watch_ground_stations(now_s)
         self._missions.advance()
@@ -246,6 +291,12 @@ class Endpoint:
     def _beat(self) -> None:
         self._heartbeat_due_s = self._link.wall_s + HEARTBEAT_S
         self._link.broadcast(vehicle_heartbeat(self._link))
+
+    def _tell_refusals(self, now_s: float) -> None:
+        told, told_s = self._refused_told
+        if self.refused > told and now_s - told_s >= REFUSALS_TOLD_S:
+            log.warning("%d datagrams refused: more than their senders may send", self.refused - told)
+            self._refused_told = (self.refused, now_s)
 
     def _watch_ground_stations(self, now_s: float) -> float:
         """Tell the commander when the last ground station has gone quiet. Returns when that would be."""
@@ -319,15 +370,11 @@ class Endpoint:
         return self._link.reboot_requested
 
     @property
+    def forwarded(self) -> int:
+        """Frames passed on from one peer to another."""
+        return self._router.forwarded if self._router is not None else 0
+
+    @property
     def peers(self) -> tuple[Peer, ...]:
         """Who is being served."""
         return tuple(self._link.peers)
-
-
-def _target_places(definition: Definition) -> tuple[int, int]:
-    names = [field.name for field in definition.fields]
-    system = "target_system" if "target_system" in names else "target"
-    return (
-        names.index(system) if system in names else -1,
-        names.index("target_component") if "target_component" in names else -1,
-    )

@@ -5,8 +5,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from sitl.mavlink.codec import Definition, message
 from sitl.mavlink.identity import Identity
+from sitl.mavlink.limits import Limits
 from sitl.mavlink.metadata import Metadata
 from sitl.mavlink.peers import Address, Peer, Peers, PortKind
+from sitl.mavlink.signing import Signer
 from sitl.mavlink.view import Craft, View
 from sitl.onboard.modes import Severity
 
@@ -31,14 +33,22 @@ class Link:
     """The services' common ground. `wall_s` is the time of the call in progress."""
 
     def __init__(
-        self, vehicle: "Vehicle", identity: Identity, system_id: int, static_peers: Iterable[tuple[PortKind, Address]]
+        self,
+        vehicle: "Vehicle",
+        identity: Identity,
+        system_id: int,
+        static_peers: Iterable[tuple[PortKind, Address]],
+        limits: Limits,
+        signer: Signer | None,
     ) -> None:
         self.vehicle = vehicle
         self.identity = identity
         self.metadata = Metadata.of(vehicle.parameters)
         self.system_id: int = system_id
         self.wall_s = 0.0
-        self.peers = Peers(system_id, static_peers, vehicle.now_us)
+        self.limits = limits
+        self.signer = signer
+        self.peers = Peers(system_id, static_peers, vehicle.now_us, limits, signer)
         self.on_frame: Callable[[bytes, bool], None] | None = None
         self.shutdown_requested = False
         self.reboot_requested = False
@@ -65,7 +75,7 @@ class Link:
         if not peer.encoder.carries(definition):
             return
         frame = peer.encoder.frame(definition, payload)
-        self._put(peer, frame)
+        self.put(peer, frame)
         if self.on_frame is not None:
             self.on_frame(frame, True)
 
@@ -85,11 +95,12 @@ class Link:
         if not peer.encoder.carries(definition):
             return
         frame = peer.encoder.frame(definition, payload)
-        self._put(peer, frame)
+        self.put(peer, frame)
         if self.on_frame is not None and peer is self.peers.primary:
             self.on_frame(frame, True)
 
-    def _put(self, peer: Peer, frame: bytes) -> None:
+    def put(self, peer: Peer, frame: bytes) -> None:
+        """Bytes that are a frame already."""
         if len(self.outbox) < OUTBOX_MAX:
             self.outbox.append(Datagram(peer.kind, peer.address, frame))
 

@@ -10,7 +10,9 @@ from collections.abc import Iterable, Iterator
 from sitl.mavlink.codec import Encoder, Parser
 from sitl.mavlink.commands import Answers
 from sitl.mavlink.identity import COMPONENT_ID
+from sitl.mavlink.limits import Allowance, Limits
 from sitl.mavlink.parameters import Listing
+from sitl.mavlink.signing import Signer
 from sitl.mavlink.streams import PortKind, Schedule
 
 __all__ = ["Address", "Peer", "Peers", "PortKind"]
@@ -18,17 +20,24 @@ __all__ = ["Address", "Peer", "Peers", "PortKind"]
 Address = tuple[str, int]
 
 SILENT_S = 15.0  # wall time after which a peer is forgotten: a ground station heartbeats every second
-LEARNED_MAX = 64  # peers beyond the static ones; the one longest unheard makes way
+LEARNED_MAX = 32  # peers beyond the static ones
+QUIET_S = 3.0  # wall time after which a peer makes way for a newcomer where there are so many: never one that speaks
+
+
+_LINK_NUMBERS = {kind: number for number, kind in enumerate(PortKind)}  # in signatures
 
 
 class Peer:
     """One address at one port."""
 
-    def __init__(self, kind: PortKind, address: Address, system_id: int, now_us: int, *, static: bool = False) -> None:
+    def __init__(
+        self, kind: PortKind, address: Address, encoder: Encoder, limits: Limits, now_us: int, *, static: bool = False
+    ) -> None:
         self.kind = kind
         self.address = address
         self.static = static
-        self.encoder = Encoder(system_id, COMPONENT_ID)
+        self.encoder = encoder
+        self.allowance = Allowance(limits.peer_Hz, limits.peer_burst)
         self.reset(now_us)
 
     def reset(self, now_us: int) -> None:
@@ -40,6 +49,7 @@ class Peer:
         self.schedule = Schedule(self.kind, now_us)
         self.listing = Listing()
         self.answers = Answers()
+        self.routes: set[tuple[int, int]] = set()  # systems and components behind this address
         self.complaints: dict[str, float] = {}  # refusals told, and when: a stream of bad targets is one text
 
     def hear(self, version: int, wall_s: float) -> bool:
@@ -48,18 +58,30 @@ class Peer:
         self.heard_s = wall_s
         if version == 2:
             self.speaks_v2 = True
-        self.encoder.version = 2 if self.speaks_v2 else 1
+        self.encoder.version = 2 if self.speaks_v2 or self.encoder.signer is not None else 1
         return first
 
 
 class Peers:
     """All peers of one vehicle."""
 
-    def __init__(self, system_id: int, static: Iterable[tuple[PortKind, Address]], now_us: int) -> None:
-        self._system_id = system_id
+    def __init__(
+        self,
+        system_id: int,
+        static: Iterable[tuple[PortKind, Address]],
+        now_us: int,
+        limits: Limits,
+        signer: Signer | None,
+    ) -> None:
+        self._system_id, self._limits, self._signer = system_id, limits, signer
         self._peers: dict[tuple[PortKind, Address], Peer] = {}
         for kind, address in static:
-            self._peers[kind, address] = Peer(kind, address, system_id, now_us, static=True)
+            self._add(kind, address, now_us, static=True)
+
+    def _add(self, kind: PortKind, address: Address, now_us: int, *, static: bool = False) -> Peer:
+        encoder = Encoder(self._system_id, COMPONENT_ID, self._signer, _LINK_NUMBERS[kind])
+        peer = self._peers[kind, address] = Peer(kind, address, encoder, self._limits, now_us, static=static)
+        return peer
 
     def __iter__(self) -> Iterator[Peer]:
         return iter(self._peers.values())
@@ -78,15 +100,15 @@ class Peers:
     def find(self, kind: PortKind, address: Address) -> Peer | None:
         return self._peers.get((kind, address))
 
-    def learn(self, kind: PortKind, address: Address, now_us: int) -> Peer:
-        """A new peer, in place of the one longest unheard if there are too many."""
-        learned = [peer for peer in self._peers.values() if not peer.static]
+    def learn(self, kind: PortKind, address: Address, wall_s: float, now_us: int) -> Peer | None:
+        """A new peer, in place of the one longest unheard if there are too many; None if all of them still speak."""
+        learned = [(peer.heard_s or 0.0, key) for key, peer in self._peers.items() if not peer.static]
         if len(learned) >= LEARNED_MAX:
-            oldest = min(learned, key=lambda peer: peer.heard_s or 0.0)
-            del self._peers[oldest.kind, oldest.address]
-        peer = Peer(kind, address, self._system_id, now_us)
-        self._peers[kind, address] = peer
-        return peer
+            heard_s, oldest = min(learned, key=lambda entry: entry[0])
+            if wall_s - heard_s < QUIET_S:
+                return None
+            del self._peers[oldest]
+        return self._add(kind, address, now_us)
 
     def forget_silent(self, wall_s: float, now_us: int) -> None:
         """Drop the learned peers that have been silent too long, and take the static ones back to their start."""

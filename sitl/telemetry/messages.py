@@ -141,6 +141,11 @@ class LoopMessage(msgspec.Struct, frozen=True, gc=False):
     datagrams_in: int
     datagrams_out: int
     datagrams_dropped: int
+    datagrams_refused: int
+    datagrams_unreadable: int
+    frames_unauthentic: int
+    frames_forwarded: int
+    peers: int
     faults: int
     telemetry_messages: int
     telemetry_busy_ms: float

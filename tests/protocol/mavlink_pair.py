@@ -113,7 +113,10 @@ class Station:
 
 
 class World:
-    """A vehicle, its endpoint and the stations around it. `speed`: simulated seconds per second; 0 stands still."""
+    """A vehicle, its endpoint and the stations around it. `speed`: simulated seconds per second; 0 stands still.
+
+    Further settings are the endpoint's.
+    """
 
     def __init__(
         self,
@@ -123,12 +126,13 @@ class World:
         static_peers: Sequence[tuple[PortKind, tuple[str, int]]] = (),
         speed: float = 1.0,
         vehicle: Any = None,
-        **options: Any,
+        wall_s: float = 0.0,
+        **settings: Any,
     ) -> None:
         self.vehicle = vehicle or Vehicle(spec)
-        self.endpoint = Endpoint(self.vehicle, identity=identity, static_peers=static_peers, **options)
+        self.endpoint = Endpoint(self.vehicle, identity=identity, static_peers=static_peers, **settings)
         self.stations: list[Station] = []
-        self.wall_s = 0.0
+        self.wall_s = wall_s
         self.speed = speed
         self.sent: list[Datagram] = []
         self._simulated_us = 0.0

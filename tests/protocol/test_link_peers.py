@@ -119,9 +119,21 @@ def test_a_static_peer_that_falls_silent_goes_back_to_default_rates(make_world: 
 def test_the_peer_longest_unheard_makes_way_when_there_are_too_many(world: World) -> None:
     data = Encoder(255, 190).encode(message("HEARTBEAT", type=6))
     for k in range(200):
-        world.endpoint.receive(data, ("127.0.0.1", 6000 + k), PortKind.GCS, k * 0.01)
+        world.endpoint.receive(data, ("127.0.0.1", 6000 + k), PortKind.GCS, k * 0.1)
     ports = {peer.address[1] for peer in world.endpoint.peers}
     assert ports == set(range(6200 - peers.LEARNED_MAX, 6200))
+
+
+def test_a_peer_that_speaks_never_makes_way_however_many_newcomers_there_are(world: World) -> None:
+    data = Encoder(255, 190).encode(message("HEARTBEAT", type=6))
+    for k in range(10_000):
+        wall_s = k * 0.002
+        if k % 500 == 0:
+            world.endpoint.receive(data, ("127.0.0.1", 5000), PortKind.GCS, wall_s)
+            assert ("127.0.0.1", 5000) in {peer.address for peer in world.endpoint.peers}
+        world.endpoint.receive(data, ("10.0.0.1", 1024 + k), PortKind.GCS, wall_s)
+        assert len(world.endpoint.peers) <= peers.LEARNED_MAX
+    assert world.endpoint.refused > 9000
 
 
 def test_two_peers_have_their_own_numbering_rates_and_transfers(world: World) -> None:

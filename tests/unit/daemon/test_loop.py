@@ -60,7 +60,8 @@ class Link:
 
     def __init__(self, craft: Craft) -> None:
         self.shutdown_requested = self.reboot_requested = False
-        self.faults = 0
+        self.faults = self.refused = self.unreadable = self.unauthentic = self.forwarded = 0
+        self.peers = ()
         self.on_frame = None
         self.received: list = []
         self.polled: list[tuple[float, int]] = []

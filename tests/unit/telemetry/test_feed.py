@@ -51,7 +51,7 @@ def vehicle(monkeypatch) -> StandIn:
 
 @pytest.fixture
 def feed(vehicle) -> Feed:
-    return Feed(vehicle, 0, lambda: messages.LoopMessage(*(0,) * 14))
+    return Feed(vehicle, 0, lambda: messages.LoopMessage(*(0,) * len(messages.LoopMessage.__struct_fields__)))
 
 
 def everything(_) -> bool:
