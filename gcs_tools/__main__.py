@@ -21,6 +21,8 @@ examples:
   gcs fly missions/rectangle.yaml
   gcs takeoff --height 3 --wait && gcs land --wait
   gcs param set RATE_Y_P 0.4
+  gcs watch --signing-key flight.key                    a vehicle that was started with the same key
+  gcs param list --impair loss=0.2,dup=0.05,jitter=0.1  over a bad link
   gcs COMMAND --help explains each
 
 exit status: 0 done, 1 the vehicle refused or was lost, 2 the request itself can't be used, 130 interrupted.
@@ -42,6 +44,24 @@ def _connection(text: str) -> Any:
     try:
         return parse_connection(text)
     except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _impairment(text: str) -> Any:
+    from gcs_tools import impairment
+
+    try:
+        return impairment.parse(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _key(text: str) -> bytes:
+    from sitl.mavlink.signing import KeyFileError, read_key
+
+    try:
+        return read_key(Path(text))
+    except KeyFileError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
 
 
@@ -80,6 +100,17 @@ def parser() -> argparse.ArgumentParser:
         help="where the vehicle is (udpin:127.0.0.1:14550)",
     )
     link.add_argument("--system", type=_system, metavar="ID", help="talk to this system id (the first one heard)")
+
+    link.add_argument(
+        "--signing-key", type=_key, metavar="FILE", help="sign with this key: 32 bytes, or 64 hexadecimal digits"
+    )
+    link.add_argument(
+        "--impair",
+        type=_impairment,
+        default="seed=1",
+        metavar="loss=P,dup=P,jitter=S,seed=N",
+        help="make the link worse, both ways: shares lost and doubled, delays up to S seconds",
+    )
 
     top = _Parser(prog="gcs", description=DESCRIPTION, epilog=EXAMPLES, formatter_class=_Raw, allow_abbrev=False)
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_Parser)

@@ -11,6 +11,7 @@ from typing import Any, NoReturn, TypeVar
 from gcs_tools.vehicle_state import HANDLERS, MODES, VehicleState
 from sitl.mavlink import codec
 from sitl.mavlink.codec import mav
+from sitl.mavlink.signing import Signer, is_signed
 
 T = TypeVar("T")
 Script = Generator[float, None, T]
@@ -21,7 +22,8 @@ COMPONENT_ID = mav.MAV_COMP_ID_MISSIONPLANNER
 HEARTBEAT_S = 1.0
 LOST_S = 3.0  # of silence, after which the vehicle counts as lost
 RETRY_S = 0.7  # without an answer, after which a request is sent again
-TRIES = 6
+TRIES = 10
+SEEN_S = 8.0  # until a change shows in the heartbeats, of which some may be lost
 AGAIN_S = 0.5  # between a refusal and the next try, where trying again may help
 
 _AUTOPILOT = 1  # the component that flies the vehicle
@@ -41,19 +43,22 @@ class LinkError(Exception):
 class Client:
     """Talks to the first vehicle it hears, or to the one with the system id `system`.
 
+    With a signer it signs what it says, and hears only what is signed with the same key.
     `wall_s` is the caller's time of the call in progress. What a script came to is in `finished`, `result`, `fault`.
     `background`, if set, runs at every poll, sends what is due and returns when it wants to run again.
     """
 
-    def __init__(self, system: int | None = None) -> None:
+    def __init__(self, system: int | None = None, signer: Signer | None = None) -> None:
         self.system = system
+        self.unauthentic = 0  # frames heard that the key doesn't fit
+        self._signer, self._signed_heard = signer, False
         self.vehicle = VehicleState()
         self.wall_s = 0.0
         self.background: Callable[[], float] | None = None
         self.finished = False
         self.result: Any = None
         self.fault: LinkError | None = None
-        self._encoder = codec.Encoder(SYSTEM_ID, COMPONENT_ID)
+        self._encoder = codec.Encoder(SYSTEM_ID, COMPONENT_ID, signer)
         self._parser = codec.Parser()
         self._out: list[bytes] = []
         self._script: Script[Any] | None = None
@@ -87,6 +92,9 @@ class Client:
         self.wall_s = wall_s
         ours = False
         for frame in self._parser.feed(data):
+            if not self._is_authentic(frame):
+                self.unauthentic += 1
+                continue
             if frame.system != self.system and not self._adopt(frame):
                 continue
             if frame.component != _AUTOPILOT:
@@ -104,6 +112,13 @@ class Client:
         if ours:
             self.vehicle.heard_s = wall_s
         return ours
+
+    def _is_authentic(self, frame: codec.Frame) -> bool:
+        if self._signer is None:
+            self._signed_heard = self._signed_heard or is_signed(frame.raw)
+            return True
+        self._signer.keep_time(self.wall_s)
+        return self._signer.admits(frame.raw, frame.id, frame.system, frame.component)
 
     def _adopt(self, frame: codec.Frame) -> bool:
         """Whether the frame is from a vehicle to settle on: the first autopilot heard."""
@@ -125,6 +140,8 @@ class Client:
     def poll(self, wall_s: float) -> list[bytes]:
         """Everything to send now. Call it after receiving, and at next_deadline."""
         self.wall_s = wall_s
+        if self._signer is not None:
+            self._signer.keep_time(wall_s)
         if wall_s >= self._next_heartbeat_s:
             self._next_heartbeat_s = wall_s + HEARTBEAT_S
             self.send(self._heartbeat)
@@ -188,7 +205,12 @@ class Client:
         """Until a vehicle is heard that has finished booting."""
         which = f"vehicle with system id {self.system}" if self.system else "vehicle"
         v = self.vehicle
-        yield from self.wait(lambda: v.heard_s is not None, patience_s, f"no {which} heard in {patience_s:g} s")
+        try:
+            yield from self.wait(lambda: v.heard_s is not None, patience_s, f"no {which} heard in {patience_s:g} s")
+        except LinkError as error:
+            raise LinkError(f"{error}{'; what is heard has another key' if self.unauthentic else ''}") from None
+        if self._signed_heard:
+            raise LinkError("the vehicle signs its messages: give its key with --signing-key")
         if v.mode is None:
             self.request("HEARTBEAT")  # sooner than the next one
         booting = (mav.MAV_STATE_UNINIT, mav.MAV_STATE_BOOT, mav.MAV_STATE_CALIBRATING)
@@ -240,28 +262,45 @@ class Client:
         flag = mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
         yield from self.require(f"mode {mode}", mav.MAV_CMD_DO_SET_MODE, flag, main, sub, patience_s=patience_s)
         v = self.vehicle
-        yield from self.wait(lambda: v.mode == mode, 3.0, f"mode {mode} was accepted but isn't in force")
+        yield from self.wait(lambda: v.mode == mode, SEEN_S, f"mode {mode} was accepted but isn't in force")
 
     def arm(self, patience_s: float = 0.0) -> Script[None]:
         yield from self.require("arming", mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, patience_s=patience_s)
         v = self.vehicle
-        yield from self.wait(lambda: v.armed, 3.0, "arming was accepted but the vehicle isn't armed")
+        yield from self.wait(lambda: v.armed, SEEN_S, "arming was accepted but the vehicle isn't armed")
 
     def disarm(self, patience_s: float = 0.0) -> Script[None]:
         yield from self.require("disarming", mav.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, patience_s=patience_s)
         v = self.vehicle
-        yield from self.wait(lambda: not v.armed, 3.0, "disarming was accepted but the vehicle is still armed")
+        yield from self.wait(lambda: not v.armed, SEEN_S, "disarming was accepted but the vehicle is still armed")
 
     def set_intervals(self, intervals_us: dict[str, int]) -> Script[None]:
-        """Set the streams' intervals, all in one go, and see every one answered (in whatever way)."""
-        for _ in range(TRIES):
-            self.interval_acks.clear()
-            self.send_intervals(intervals_us)
-            end_s = self.wall_s + RETRY_S
-            while len(self.interval_acks) < len(intervals_us) and self.wall_s < end_s:
-                yield end_s
-            if len(self.interval_acks) >= len(intervals_us):
-                return
+        """Set the streams' intervals, all in one go, and see every one answered (in whatever way).
+
+        An acknowledgement doesn't tell which interval it is for. So where one is missing, the vehicle is asked for the
+        intervals in force as well, and only those that are not yet as wanted are set again.
+        """
+        open_us, numbers = dict(intervals_us), {codec.by_name(name).id: name for name in intervals_us}
+
+        def told(m: Any) -> None:
+            name = numbers.get(m.message_id, "")
+            if open_us.get(name) == m.interval_us:
+                del open_us[name]
+
+        self.on["MESSAGE_INTERVAL"] = told
+        try:
+            for attempt in range(TRIES):
+                self.interval_acks.clear()
+                self.send_intervals(open_us)
+                for name in open_us if attempt else ():
+                    self.request("MESSAGE_INTERVAL", float(codec.by_name(name).id))
+                end_s = self.wall_s + RETRY_S
+                while len(self.interval_acks) < len(open_us) and self.wall_s < end_s:
+                    yield end_s
+                if len(self.interval_acks) >= len(open_us):
+                    return
+        finally:
+            del self.on["MESSAGE_INTERVAL"]
         raise LinkError("the vehicle doesn't answer SET_MESSAGE_INTERVAL")
 
     def send_intervals(self, intervals_us: dict[str, int]) -> None:
@@ -274,11 +313,11 @@ class Client:
                 )
             )
 
-    def request(self, name: str) -> None:
+    def request(self, name: str, detail: float = 0.0) -> None:
         """Ask for one message, once."""
         number = float(codec.by_name(name).id)
         command = mav.MAV_CMD_REQUEST_MESSAGE
-        self.send(codec.message("COMMAND_LONG", command=command, param1=number, **self.address()))
+        self.send(codec.message("COMMAND_LONG", command=command, param1=number, param2=detail, **self.address()))
 
 
 def command_name(command: int) -> str:

@@ -2,7 +2,7 @@
 
 import math
 
-from gcs_tools.client import Client, LinkError, Script
+from gcs_tools.client import SEEN_S, Client, LinkError, Script
 from sitl.mavlink.codec import mav
 
 NAN = math.nan
@@ -14,14 +14,14 @@ LANDING_LIMIT_S = 300.0
 def arm(client: Client, *, force: bool = False) -> Script[str]:
     yield from client.connect()
     yield from client.require("arming", mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, FORCE if force else 0.0)
-    yield from client.wait(lambda: client.vehicle.armed, 3.0, "arming was accepted but the vehicle isn't armed")
+    yield from client.wait(lambda: client.vehicle.armed, SEEN_S, "arming was accepted but the vehicle isn't armed")
     return "armed"
 
 
 def disarm(client: Client, *, force: bool = False) -> Script[str]:
     yield from client.connect()
     yield from client.require("disarming", mav.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, FORCE if force else 0.0)
-    yield from client.wait(lambda: not client.vehicle.armed, 3.0, "disarming was accepted but the vehicle is armed")
+    yield from client.wait(lambda: not client.vehicle.armed, SEEN_S, "disarming was accepted but the vehicle is armed")
     return "disarmed"
 
 
@@ -32,7 +32,7 @@ def takeoff(client: Client, *, height_m: float | None, wait: bool) -> Script[str
     altitude = NAN
     if height_m is not None:
         client.request("HOME_POSITION")
-        yield from client.wait(lambda: v.home is not None, 5.0, "the vehicle doesn't tell its home")
+        yield from client.wait(lambda: v.home is not None, SEEN_S, "the vehicle doesn't tell its home")
         assert v.home is not None
         altitude = v.home[2] + height_m
     yield from client.require("take-off", mav.MAV_CMD_NAV_TAKEOFF, NAN, 0.0, 0.0, NAN, NAN, NAN, altitude)
@@ -40,7 +40,7 @@ def takeoff(client: Client, *, height_m: float | None, wait: bool) -> Script[str
         yield from client.arm()
     if not wait:
         return "taking off"
-    yield from client.wait(lambda: v.mode == "takeoff", 3.0, "take-off was accepted but its mode isn't in force")
+    yield from client.wait(lambda: v.mode == "takeoff", SEEN_S, "take-off was accepted but its mode isn't in force")
     yield from client.wait(
         lambda: v.mode != "takeoff" or not v.armed, CLIMB_LIMIT_S, f"not up after {CLIMB_LIMIT_S:g} s"
     )

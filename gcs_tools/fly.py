@@ -7,9 +7,11 @@ from pathlib import Path
 from gcs_tools import results
 from gcs_tools.client import Client, LinkError
 from gcs_tools.flight import Flight
+from gcs_tools.impairment import GOOD, Impairment
 from gcs_tools.link import Connection, UdpLink
 from gcs_tools.plan import Plan
 from gcs_tools.progress import Progress
+from sitl.mavlink.signing import Signer
 
 
 def fly(
@@ -17,6 +19,8 @@ def fly(
     connection: Connection,
     *,
     system: int | None = None,
+    signer: Signer | None = None,
+    impairment: Impairment = GOOD,
     out: Path | None = None,
     as_json: bool = False,
     check: Callable[[], None] = lambda: None,
@@ -27,10 +31,10 @@ def fly(
     whole time is measured and told even if the landing behind it went wrong.
     """
     results.prepare(out)
-    client = Client(system)
+    client = Client(system, signer)
     flight = Flight(plan, client)
     fault: LinkError | None = None
-    with UdpLink(connection) as link:
+    with UdpLink(connection, impairment) as link:
         try:
             with Progress(flight, quiet=as_json) as progress:
 

@@ -12,6 +12,8 @@ from types import TracebackType
 from typing import NamedTuple
 
 from gcs_tools.client import Client, LinkError
+from gcs_tools.impairment import GOOD, Impairment, Wire
+from sitl.mavlink.signing import Signer
 
 Address = tuple[str, int]
 
@@ -48,12 +50,20 @@ def parse_connection(text: str) -> Connection:
     return Connection(kind == "udpin", host, int(port))
 
 
-class UdpLink:
-    """One socket between a Client and its vehicle."""
+def signer(key: bytes) -> Signer:
+    """One that stamps by this module's clock."""
+    return Signer(key, unix_s=time.time() - now_s())
 
-    def __init__(self, connection: Connection) -> None:
+
+class UdpLink:
+    """One socket between a Client and its vehicle, and what is to go wrong on the way."""
+
+    def __init__(self, connection: Connection, impairment: Impairment = GOOD) -> None:
         where = f"{connection.host}:{connection.port}"
         self._peer: Address | None = None
+        self._in: Wire[tuple[bytes, Address]]
+        self._out: Wire[bytes]
+        self._in, self._out = Wire(impairment), Wire(impairment.reversed())
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER_BYTES)
@@ -76,21 +86,26 @@ class UdpLink:
     def turn(self, client: Client) -> None:
         """Send what the client has, wait for an arrival or its next deadline, hand over what has arrived."""
         self.flush(client)
-        wait_s = 0.0 if client.finished else min(LONGEST_WAIT_S, max(0.0, client.next_deadline - now_s()))
+        next_s = min(client.next_deadline, self._in.next_s, self._out.next_s)
+        wait_s = 0.0 if client.finished else min(LONGEST_WAIT_S, max(0.0, next_s - now_s()))
         select.select([self._socket], [], [], wait_s)
         while True:
             try:
                 data, address = self._socket.recvfrom(_RECEIVE_BYTES)
             except BlockingIOError:
-                return
+                break
             except ConnectionError:
                 continue  # nobody listens there (yet)
+            self._in.put(now_s(), (data, address))
+        for data, address in self._in.take(now_s()):
             if client.receive(data, now_s()):
                 self._peer = address
 
     def flush(self, client: Client) -> None:
         """Send what the client has to say now. What nobody has been heard for is dropped."""
         for data in client.poll(now_s()):
+            self._out.put(now_s(), data)
+        for data in self._out.take(now_s()):
             if self._peer is not None:
                 try:
                     self._socket.sendto(data, self._peer)

@@ -126,22 +126,28 @@ def _write(client: Client, old: Parameter, value: float) -> Script[Parameter]:
         raise LinkError(f"{old.name}: {value:g} refused: it takes whole numbers")
     wire = float_of_int(int(value)) if old.is_int else float32(value)
     kind = mav.MAV_PARAM_TYPE_INT32 if old.is_int else _REAL32
+    written = int(value) if old.is_int else float32(value)
     request = codec.message("PARAM_SET", param_id=old.name, param_value=wire, param_type=kind, **client.address())
     try:
-        new = yield from _exchange(client, old.name, request)
+        new = yield from _exchange(client, old.name, request, written)
     except LinkError as fault:
         yield from client.pause(0.1)  # for the reason, which is told apart
         reason = client.vehicle.reasons_since(asked_s)
         raise LinkError(f"{fault}{': ' + reason if reason else ''}; it stays {old.text}") from None
-    if new.value != (int(value) if old.is_int else float32(value)):
+    if new.value != written:
         raise LinkError(f"{old.name}: {value:g} refused; it stays {new.text}")
     return new
 
 
-def _exchange(client: Client, name: str, request: Any) -> Script[Parameter]:
-    """Send until PARAM_VALUE or PARAM_ERROR answers."""
+def _exchange(client: Client, name: str, request: Any, written: float | None = None) -> Script[Parameter]:
+    """Send until PARAM_VALUE or PARAM_ERROR answers.
+
+    Another value than what was written may have been on its way before; told again after another try it is the answer.
+    """
     with _Mailbox(client) as box:
+        others = 0
         for _ in range(TRIES):
+            box.values.pop(name, None)
             client.send(request)
             end_s = client.wall_s + RETRY_S
             while client.wall_s < end_s:
@@ -149,8 +155,11 @@ def _exchange(client: Client, name: str, request: Any) -> Script[Parameter]:
                 if name in box.errors:
                     code = box.errors[name]
                     raise LinkError(f"{name}: {_ERRORS[code] if 0 < code < len(_ERRORS) else f'error {code}'}")
-                if name in box.values:
+                if name in box.values and written in (None, box.values[name].value):
                     return box.values[name]
+            others += name in box.values
+            if others == 2:
+                return box.values[name]
     raise LinkError(f"{name}: the vehicle doesn't answer; it may have no such parameter")
 
 

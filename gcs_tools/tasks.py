@@ -8,7 +8,8 @@ from typing import Any
 
 from gcs_tools import commands, params
 from gcs_tools.client import Client, Script
-from gcs_tools.link import UdpLink
+from gcs_tools.link import UdpLink, signer
+from sitl.mavlink.signing import Signer
 
 
 def run(args: argparse.Namespace) -> None:
@@ -16,9 +17,17 @@ def run(args: argparse.Namespace) -> None:
     _TASKS[args.command](args)
 
 
+def _signer(args: argparse.Namespace) -> Signer | None:
+    return signer(args.signing_key) if args.signing_key is not None else None
+
+
+def _client(args: argparse.Namespace) -> Client:
+    return Client(args.system, _signer(args))
+
+
 def _converse(args: argparse.Namespace, talk: Callable[[Client], Script[Any]]) -> Any:
-    client = Client(args.system)
-    with UdpLink(args.connect) as link:
+    client = _client(args)
+    with UdpLink(args.connect, args.impair) as link:
         client.start(talk(client))
         link.run(client)
     return client.result
@@ -28,7 +37,15 @@ def _fly(args: argparse.Namespace) -> None:
     from gcs_tools import plan
     from gcs_tools.fly import fly
 
-    fly(plan.load(args.mission), args.connect, system=args.system, out=args.out, as_json=args.json)
+    fly(
+        plan.load(args.mission),
+        args.connect,
+        system=args.system,
+        signer=_signer(args),
+        impairment=args.impair,
+        out=args.out,
+        as_json=args.json,
+    )
 
 
 def _param(args: argparse.Namespace) -> None:
@@ -83,8 +100,8 @@ def _param_load(args: argparse.Namespace) -> None:
 def _watch(args: argparse.Namespace) -> None:
     from gcs_tools.watch import Watch, until
 
-    client = Client(args.system)
-    with UdpLink(args.connect) as link, Watch(client) as watch:
+    client = _client(args)
+    with UdpLink(args.connect, args.impair) as link, Watch(client) as watch:
         client.start(until(client, args.seconds or math.inf))
         link.run(client, watch.update)
 

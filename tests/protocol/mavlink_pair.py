@@ -1,13 +1,14 @@
 """Two ends of the link in memory: the real vehicle behind its endpoint, stations, and wires that lose things.
 
-All time is injected. A wire drops, duplicates, delays and, where delays differ, reorders datagrams, by its own seed.
+All time is injected.
 """
 
-import random
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from gcs_tools import impairment
 from gcs_tools.client import Client, Script
+from gcs_tools.impairment import Impairment
 from sitl.mavlink.codec import Encoder, Frame, Parser, mav, message
 from sitl.mavlink.endpoint import Datagram, Endpoint, Identity, PortKind
 from sitl.onboard.mission import MissionItem
@@ -17,26 +18,9 @@ from sitl.vehicle_spec import VehicleSpec
 STEP_S = 0.01
 
 
-class Wire:
+def Wire(*, drop: float = 0.0, duplicate: float = 0.0, jitter_s: float = 0.0, seed: int = 1) -> impairment.Wire[bytes]:
     """One direction of a link."""
-
-    def __init__(self, *, drop: float = 0.0, duplicate: float = 0.0, jitter_s: float = 0.0, seed: int = 1) -> None:
-        self._random = random.Random(seed)
-        self._drop, self._duplicate, self._jitter_s = drop, duplicate, jitter_s
-        self._on_the_way: list[tuple[float, int, bytes]] = []
-        self._count = 0
-
-    def put(self, now_s: float, data: bytes) -> None:
-        copies = 2 if self._random.random() < self._duplicate else 1
-        for _ in range(copies):
-            if self._random.random() >= self._drop:
-                self._count += 1
-                self._on_the_way.append((now_s + self._random.random() * self._jitter_s, self._count, data))
-
-    def take(self, now_s: float) -> list[bytes]:
-        arrived = sorted(entry for entry in self._on_the_way if entry[0] <= now_s)
-        self._on_the_way = [entry for entry in self._on_the_way if entry[0] > now_s]
-        return [data for _, _, data in arrived]
+    return impairment.Wire(Impairment(drop, duplicate, jitter_s, seed))
 
 
 class Station:
@@ -49,8 +33,8 @@ class Station:
         kind: PortKind = PortKind.ONBOARD,
         system: int = 255,
         component: int = 190,
-        up: Wire | None = None,
-        down: Wire | None = None,
+        up: impairment.Wire[bytes] | None = None,
+        down: impairment.Wire[bytes] | None = None,
     ) -> None:
         self.address = ("127.0.0.1", port)
         self.kind = kind
