@@ -20,7 +20,7 @@ from gcs_tools.progress import Progress
 from sitl.geodesy import GeoPoint
 from sitl.mavlink.endpoint import Endpoint, PortKind
 from sitl.strict_yaml import ConfigError
-from sitl.vehicle import DEFAULT_HOME, Vehicle, load_vehicle
+from sitl.vehicle import DEFAULT_HOME, Vehicle, load_vehicle, with_airframe
 
 TURN_US = 20_000
 ADDRESS = ("127.0.0.1", 14540)
@@ -67,13 +67,19 @@ def build(plan: Plan, args: argparse.Namespace) -> Vehicle:
     home = DEFAULT_HOME
     if isinstance(plan, Uploaded) and plan.home is not None:
         home = GeoPoint(*plan.home)
-    return Vehicle(
+    spec, believed = with_airframe(
         load_vehicle(args.vehicle),
+        dict(getattr(args, "plant", None) or ()),
+        dict(getattr(args, "believed", None) or ()),
+    )
+    return Vehicle(
+        spec,
         home=home,
         seed=args.seed,
         wind_N=args.wind,
         gust_m_s=getattr(args, "gust", 0.0),
         overrides=dict(getattr(args, "set", None) or ()),
+        believed_airframe=believed,
     )
 
 

@@ -61,6 +61,7 @@ examples:
   sitl fly missions/circle.yaml --vehicle yawsitter-real --seed 3
   sitl fly missions/rectangle.yaml --wind 1,0,0 --gust 0.5 --json
   sitl fly missions/hover.yaml --set RATE_Y_P=0.4 --out out/hover
+  sitl fly missions/circle.yaml --plant air_density_kg_m3=1.0     in air thinner than the controller believes
   sitl fly plan.plan                               a QGroundControl plan
 
 exit status: 0 when the mission was flown, 1 when it was not, 2 for settings that can't be used.
@@ -244,6 +245,15 @@ def _parser() -> argparse.ArgumentParser:
     fly.add_argument("mission", type=Path, metavar="MISSION", help="a mission (.yaml) or QGroundControl plan (.plan)")
     _add_vehicle(fly)
     _add_simulation(fly, "max")
+    for option, whose in (("--plant", "the vehicle that flies"), ("--believed", "what the controller takes it to be")):
+        fly.add_argument(
+            option,
+            type=_reader(config.parse_airframe),
+            default=[],
+            action="append",
+            metavar="NAME=VALUE",
+            help=f"change an airframe number of {whose}; may be given again",
+        )
     fly.add_argument("--out", type=Path, metavar="DIR", help="write the flight's logs and figures here")
     fly.add_argument("--json", action="store_true", help="print one JSON object")
 

@@ -40,9 +40,9 @@ from sitl.quaternion import Vec3
 from sitl.records import packed
 from sitl.snapshot import Battery, Snapshot
 from sitl.strict_yaml import ConfigError
-from sitl.vehicle_spec import VehicleSpec, load_vehicle, vehicle_names
+from sitl.vehicle_spec import VehicleSpec, load_vehicle, vehicle_names, with_airframe
 
-__all__ = ["DEFAULT_HOME", "Load", "Vehicle", "load_vehicle", "vehicle_names"]
+__all__ = ["DEFAULT_HOME", "Load", "Vehicle", "load_vehicle", "vehicle_names", "with_airframe"]
 
 DEFAULT_HOME = GeoPoint(55.6985, 37.3595, 190.0)  # Skolkovo, where the paper's vehicle was built
 TICK_US = 20_000  # of the onboard logic

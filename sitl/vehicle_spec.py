@@ -1,6 +1,7 @@
 """A vehicle's specification: airframe + gains + actuators + sensors, from one short YAML file."""
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -9,7 +10,7 @@ import msgspec
 from sitl import strict_yaml
 from sitl.control.gains import GAIN_NAMES
 from sitl.model import airframe
-from sitl.model.airframe import LoadedAirframe
+from sitl.model.airframe import Airframe, LoadedAirframe
 from sitl.model.derivative import Actuators
 from sitl.model.sensors import Sensors
 from sitl.strict_yaml import ConfigError
@@ -97,6 +98,18 @@ def load_gains(path: Path) -> dict[str, float]:
             line = strict_yaml.line_of(path.read_text(encoding="utf-8"), f"gains.{name[:-2]}")
             raise ConfigError(f"{path}:{line}: gains.{name[:-2]}.{name[-1]}: {value} must be 0 or greater")
     return gains
+
+
+def with_airframe(
+    spec: VehicleSpec, plant: Mapping[str, float], believed: Mapping[str, float]
+) -> tuple[VehicleSpec, Airframe]:
+    """The vehicle with other airframe numbers, and the airframe as its controller takes it to be, with others again.
+
+    The controller hears nothing of what is changed in the plant alone. Raises ConfigError.
+    """
+    a = spec.airframe.airframe
+    flown = spec.airframe._replace(airframe=airframe.changed(a, plant))
+    return spec._replace(airframe=flown), airframe.changed(a, believed)
 
 
 def load_vehicle(name_or_path: str) -> VehicleSpec:

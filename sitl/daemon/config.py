@@ -166,14 +166,25 @@ def parse_seed(text: str) -> int:
 
 
 def parse_setting(text: str) -> tuple[str, float]:
+    """A parameter's name, in the capitals that all have, and its value."""
+    name, number = _named_number(text, "RATE_Y_P=0.4")
+    return name.upper(), number
+
+
+def parse_airframe(text: str) -> tuple[str, float]:
+    """The name of an airframe number, as the airframe file has it, and its value."""
+    return _named_number(text, "mass_kg=1.2")
+
+
+def _named_number(text: str, example: str) -> tuple[str, float]:
     name, separator, value = text.partition("=")
     try:
         number = float(value)
     except ValueError:
         number = math.nan
     if not name or not separator or not math.isfinite(number):
-        raise SettingError(f"'{text}' is not NAME=VALUE with a number as value (for example RATE_Y_P=0.4)")
-    return name.strip().upper(), number
+        raise SettingError(f"'{text}' is not NAME=VALUE with a number as value (for example {example})")
+    return name.strip(), number
 
 
 def parse_peer(text: str) -> Address:

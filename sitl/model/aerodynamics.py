@@ -66,13 +66,13 @@ def wing_loads(
 ) -> tuple[Vec3, Vec3]:
     """Force [N] and moment [N·m] in B of the whole wing without flaps: the part in each slipstream, and the rest.
 
-    The slipstreams' parts act at the propellers' lever, so unequal wakes roll and yaw the vehicle.
+    The slipstreams' parts act at a lever of their own, so unequal wakes roll and yaw the vehicle.
     """
     f = 0.5 * a.immersed_fraction
     lx, lz, lm = panel(a, wake_left_m_s, w_m_s, f)
     rx, rz, rm = panel(a, wake_right_m_s, w_m_s, f)
     fx, fz, fm = panel(a, u_m_s, w_m_s, 1.0 - a.immersed_fraction)
-    arm = a.prop_arm_m
+    arm = a.wake_arm_m
     return (lx + rx + fx, 0.0, lz + rz + fz), (arm * (rz - lz), lm + rm + fm, arm * (lx - rx))
 
 

@@ -1,6 +1,7 @@
 """The airframe: every number of the plant, read from a YAML file that gives each its unit and source."""
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -44,6 +45,7 @@ class Airframe(NamedTuple):
     prop_radius_m: float  # [R_prop]
     slipstream_radius_ratio: float  # [R_s / R]
     prop_arm_m: float  # [l_y] from x axis to one propeller
+    wake_arm_m: float  # from x axis to where the wing feels one slipstream; 0: unequal slipstreams don't roll or yaw it
     thrust_coefficient: float  # [C_T] N s2
     torque_coefficient: float  # [C_mu] N m s2
     thrust_min_N: float  # of one motor when running
@@ -106,8 +108,9 @@ class AirframeFile(msgspec.Struct, forbid_unknown_fields=True):
 _POSITIVE = {
     "mass_kg", "jxx_kg_m2", "jyy_kg_m2", "jzz_kg_m2", "air_density_kg_m3", "wing_area_m2", "wing_span_m", "chord_m",
     "oswald", "stall_angle_rad", "stall_sharpness", "flap_max_rad", "prop_radius_m", "slipstream_radius_ratio",
-    "prop_arm_m", "thrust_coefficient", "torque_coefficient", "thrust_max_N",
+    "prop_arm_m", "thrust_coefficient", "thrust_max_N",
 }  # fmt: skip
+_NOT_NEGATIVE = {"torque_coefficient", "wake_arm_m", "thrust_min_N"}
 
 
 class LoadedAirframe(NamedTuple):
@@ -125,23 +128,37 @@ def load(path: Path) -> LoadedAirframe:
         if names:
             raise ConfigError(f"{path}: parameters: {problem}: {', '.join(sorted(names))}")
     text = path.read_text(encoding="utf-8")
-    for name, entry in content.parameters.items():
-        fault = (
-            "is not finite"
-            if not math.isfinite(entry.value)
-            else "must be greater than 0"
-            if name in _POSITIVE and entry.value <= 0.0
-            else ""
-        )
-        if fault:
-            line = strict_yaml.line_of(text, f"parameters.{name}")
-            raise ConfigError(f"{path}:{line}: parameters.{name}: {entry.value} {fault}")
     airframe = Airframe(**{name: content.parameters[name].value for name in Airframe._fields})
-    if not 0.0 <= airframe.immersed_fraction <= 1.0:
-        raise ConfigError(f"{path}: parameters.immersed_fraction: {airframe.immersed_fraction} must be in 0 … 1")
-    if not 0.0 <= airframe.thrust_min_N < airframe.thrust_max_N:
-        raise ConfigError(f"{path}: parameters.thrust_min_N: must be at least 0 and below thrust_max_N")
+    if (mistake := fault(airframe)) is not None:
+        name, message = mistake
+        raise ConfigError(f"{path}:{strict_yaml.line_of(text, f'parameters.{name}')}: parameters.{name}: {message}")
     return LoadedAirframe(path.stem, content, airframe, gear(content.gear, airframe))
+
+
+def fault(a: Airframe) -> tuple[str, str] | None:
+    """(number's name, what is wrong with it) of the first that no airframe can have."""
+    for name, value in a._asdict().items():
+        if not math.isfinite(value):
+            return name, f"{value} is not finite"
+        if name in _POSITIVE and value <= 0.0:
+            return name, f"{value} must be greater than 0"
+        if name in _NOT_NEGATIVE and value < 0.0:
+            return name, f"{value} must be 0 or greater"
+    if not 0.0 <= a.immersed_fraction <= 1.0:
+        return "immersed_fraction", f"{a.immersed_fraction} must be in 0 … 1"
+    if a.thrust_min_N >= a.thrust_max_N:
+        return "thrust_min_N", f"{a.thrust_min_N} must be below thrust_max_N, {a.thrust_max_N}"
+    return None
+
+
+def changed(a: Airframe, values: Mapping[str, float]) -> Airframe:
+    """The airframe with other numbers. Raises ConfigError for one that there isn't or that can't be."""
+    if unknown := sorted(set(values) - set(Airframe._fields)):
+        raise ConfigError(f"airframe: unknown: {', '.join(unknown)}; there are {', '.join(Airframe._fields)}")
+    new = a._replace(**values)
+    if (mistake := fault(new)) is not None:
+        raise ConfigError(f"airframe: {mistake[0]}: {mistake[1]}")
+    return new
 
 
 def gear(file: GearFile, airframe: Airframe) -> Gear:

@@ -128,6 +128,22 @@ def test_the_same_seed_gives_the_same_flight_in_two_processes(tmp_path: Path) ->
     assert outs[0] == outs[1]
 
 
+def test_a_changed_airframe_flies_worse_where_the_controller_does_not_know_of_it() -> None:
+    def mae(*changes: str) -> list[float]:
+        done = command_line(str(MISSIONS / "hover.yaml"), "--json", *changes)
+        assert done.returncode == 0, done.stderr
+        return list(json.loads(done.stdout)["mae"])
+
+    heavy = ("--plant", "mass_kg=1.2")
+    assert mae(*heavy)[2] > 2.0 * mae(*heavy, "--believed", "mass_kg=1.2")[2]
+
+
+def test_an_airframe_number_that_there_is_not_is_refused() -> None:
+    done = command_line(str(MISSIONS / "hover.yaml"), "--plant", "mass=1.2")
+    assert done.returncode == 2
+    assert done.stderr.startswith("sitl fly: airframe: unknown: mass; there are mass_kg")
+
+
 def test_json_is_the_only_thing_on_standard_output() -> None:
     done = command_line(str(MISSIONS / "hover.yaml"), "--json")
     assert done.returncode == 0

@@ -5,7 +5,7 @@ import pytest
 from sitl.control.gains import GAIN_NAMES
 from sitl.model.airframe import Airframe
 from sitl.strict_yaml import ConfigError
-from sitl.vehicle_spec import load_vehicle, vehicle_names
+from sitl.vehicle_spec import load_vehicle, vehicle_names, with_airframe
 
 BUNDLED = Path("sitl")
 
@@ -74,7 +74,9 @@ def test_a_mistake_in_a_vehicle_file_is_named_with_its_line(tmp_path: Path, old:
         ("{value: 1.076, ", "{value: -1, ", "parameters.mass_kg: -1.* must be greater than 0"),
         ("{value: 1.076, ", "{value: .nan, ", "parameters.mass_kg: nan is not finite"),
         ("  mass_kg:", "  mass:", "parameters: missing: mass_kg"),
-        ("{value: 0.513,", "{value: 1.5,", "immersed_fraction: 1.5 must be in 0"),
+        ("{value: 0.513,", "{value: 1.5,", r"yaml:\d+: parameters.immersed_fraction: 1.5 must be in 0"),
+        ("{value: 0.5, ", "{value: 11, ", r"yaml:\d+: parameters.thrust_min_N: 11.0 must be below thrust_max_N, 11.0"),
+        ("{value: 1.387e-7, ", "{value: -1, ", "parameters.torque_coefficient: -1.0 must be 0 or greater"),
     ],
 )
 def test_a_mistake_in_an_airframe_file_is_named(tmp_path: Path, old: str, new: str, message: str) -> None:
@@ -93,3 +95,20 @@ def test_a_negative_gain_is_refused_with_its_line(tmp_path: Path) -> None:
     (tmp_path / "mine-gains.yaml").write_text(text.replace("P: 2.84", "P: -2.84"))
     with pytest.raises(ConfigError, match=r"mine-gains.yaml:3: gains.POS_X.P: -2.84 must be 0 or greater"):
         load_vehicle(edited(tmp_path, "gains: paper", "gains: mine-gains.yaml"))
+
+
+def test_a_changed_airframe_flies_while_the_controller_believes_in_another() -> None:
+    spec = load_vehicle("yawsitter")
+    heavy, believed = with_airframe(spec, {"mass_kg": 1.2}, {"side_force_factor": 0.0})
+    printed = spec.airframe.airframe
+    assert heavy.airframe.airframe == printed._replace(mass_kg=1.2)
+    assert believed == printed._replace(side_force_factor=0.0)
+    assert spec.airframe.airframe.mass_kg == 1.076
+
+
+def test_an_airframe_number_that_there_is_not_or_that_cannot_be_is_refused() -> None:
+    spec = load_vehicle("yawsitter")
+    with pytest.raises(ConfigError, match="airframe: unknown: mass; there are mass_kg, jxx_kg_m2"):
+        with_airframe(spec, {"mass": 1.2}, {})
+    with pytest.raises(ConfigError, match=r"airframe: mass_kg: 0\.0 must be greater than 0"):
+        with_airframe(spec, {}, {"mass_kg": 0.0})

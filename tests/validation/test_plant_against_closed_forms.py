@@ -153,6 +153,19 @@ def test_more_thrust_on_the_left_yaws_to_the_right_and_pushes_to_the_right() -> 
     assert x.thrust_force[0] == pytest.approx(11.0)
 
 
+def test_unequal_slipstreams_roll_and_yaw_the_wing_by_their_lever_alone() -> None:
+    left, right = rotor_speed(A, 6.0), rotor_speed(A, 5.0)
+    uneven = high_up(rotor_left_rad_s=left, rotor_right_rad_s=right)
+    each = [loads(A, G, high_up(rotor_left_rad_s=w, rotor_right_rad_s=w), STILL).wing_force for w in (left, right)]
+    x = loads(A, G, uneven, STILL)
+    assert x.wing_moment[0] == pytest.approx(A.wake_arm_m * 0.5 * (each[1][2] - each[0][2]))
+    assert x.wing_moment[2] == pytest.approx(A.wake_arm_m * 0.5 * (each[0][0] - each[1][0]))
+    assert abs(x.wing_moment[0]) > 0.01
+    without = loads(A._replace(wake_arm_m=0.0), G, uneven, STILL)
+    assert (without.wing_moment[0], without.wing_moment[2]) == (0.0, 0.0)
+    assert without.wing_force == x.wing_force
+
+
 def test_trailing_edges_down_pitch_the_nose_down_and_lift() -> None:
     rotors = {"rotor_left_rad_s": 800.0, "rotor_right_rad_s": 800.0}
     x = loads(A, G, high_up(**rotors, flap_left_rad=0.1, flap_right_rad=0.1), STILL)

@@ -37,6 +37,7 @@ def test_home_is_a_point_and_a_heading() -> None:
         (config.parse_setting, "RATE_Y_P", "NAME=VALUE"),
         (config.parse_setting, "RATE_Y_P=nan", "NAME=VALUE"),
         (config.parse_setting, "=1", "NAME=VALUE"),
+        (config.parse_airframe, "mass_kg", "NAME=VALUE"),
         (config.parse_peer, "14550", "HOST:PORT"),
         (config.parse_peer, "127.0.0.1:0", "HOST:PORT"),
         (config.parse_peer, "127.0.0.1:70000", "HOST:PORT"),
@@ -57,6 +58,7 @@ def test_max_speed_reads_as_the_parameter_spells_it() -> None:
 
 def test_a_setting_is_a_name_and_a_number() -> None:
     assert config.parse_setting("rate_y_p=0.4") == ("RATE_Y_P", 0.4)
+    assert config.parse_airframe("mass_kg=1.2") == ("mass_kg", 1.2)
 
 
 def test_the_ports_move_with_the_instance() -> None:
