@@ -1,4 +1,4 @@
-"""The `sitl` command line: run the vehicle behind its links, fly a mission in lockstep, find a trim."""
+"""The `sitl` command line: run the vehicle behind its links, fly in lockstep, find a trim, reproduce the paper."""
 
 import argparse
 import sys
@@ -78,9 +78,28 @@ examples:
   sitl trim --airspeed 5 --json
 """
 
+REPRODUCE = """\
+Fly the paper's evaluation in lockstep and write a report: its two error tables and its ranges beside the measured ones,
+figures, ablations, and the loops' poles and margins in hover. Takes a minute on two cores; needs matplotlib, which the
+extra [report] installs.
+"""
+
+REPRODUCE_EXAMPLES = """\
+examples:
+  sitl reproduce                                   everything, into out/reproduce
+  sitl reproduce --quick --out /tmp/report         one seed, fewer ablations
+  sitl reproduce --json                            also print all numbers
+
+It writes report.html (one file, figures inside), figures/*.svg and *.png, numbers.json, numbers.csv, commands.txt and
+flights/*.csv.
+
+exit status: 0 when the report is written, 1 when a flight failed, 2 for settings that can't be used.
+"""
+
 _HELP_RUN = "run a vehicle behind MAVLink and Zenoh, in real time or faster"
 _HELP_FLY = "fly a mission in one process and print the error table"
 _HELP_TRIM = "find hover or level-flight trim"
+_HELP_REPRODUCE = "fly the paper's evaluation and write a report"
 
 
 class _Parser(argparse.ArgumentParser):
@@ -263,6 +282,13 @@ def _parser() -> argparse.ArgumentParser:
         "--airspeed", type=_reader(_airspeed), default=0.0, metavar="M_S", help="of level flight, m/s (0: hover)"
     )
     trim.add_argument("--json", action="store_true", help="print one JSON object")
+
+    reproduce = command("reproduce", _HELP_REPRODUCE, REPRODUCE, REPRODUCE_EXAMPLES)
+    reproduce.add_argument(
+        "--out", type=Path, default=Path("out/reproduce"), metavar="DIR", help="the report's folder (out/reproduce)"
+    )
+    reproduce.add_argument("--quick", action="store_true", help="one seed, ablations with the default vehicle only")
+    reproduce.add_argument("--json", action="store_true", help="print all numbers as one JSON object")
     return parser
 
 
@@ -305,6 +331,12 @@ def _trim(args: argparse.Namespace) -> int:
     return trim.main(args, load_vehicle(args.vehicle).airframe.airframe)
 
 
+def _reproduce(args: argparse.Namespace) -> int:
+    from sitl.reproduce import main as reproduction
+
+    return reproduction.main(args)
+
+
 def _is_mistake(error: ValueError) -> bool:
     """Whether the person at the keyboard can mend it; files that can't be used say so with a ConfigError."""
     from sitl.strict_yaml import ConfigError
@@ -314,7 +346,7 @@ def _is_mistake(error: ValueError) -> bool:
 
 def main(argv: Sequence[str] | None = None) -> int:
     args = _parser().parse_args(argv)
-    commands = {"run": _run, "fly": _fly, "trim": _trim}
+    commands = {"run": _run, "fly": _fly, "trim": _trim, "reproduce": _reproduce}
     try:
         return commands[args.command](args)
     except ValueError as error:

@@ -1,0 +1,1 @@
+"""The paper's evaluation again, measured: flights, ablations, loop analysis, and a report of it all."""

@@ -1,0 +1,67 @@
+"""Figures as bytes: one style for all of them, the same bytes for the same numbers."""
+
+import io
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+FEEDBACK, FEEDFORWARD, EXACT, TUNED, REFERENCE = "#d55e00", "#0072b2", "#cc79a7", "#009e73", "#333333"
+COLOURS = {"feedback": FEEDBACK, "feedforward": FEEDFORWARD, "exact": EXACT, "tuned": TUNED}
+_STYLE: dict[Any, Any] = {
+    "font.size": 9.0,
+    "axes.titlesize": 10.0,
+    "axes.grid": True,
+    "grid.color": "#dddddd",
+    "grid.linewidth": 0.6,
+    "axes.edgecolor": "#888888",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "lines.linewidth": 1.2,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "figure.dpi": 100,
+    "savefig.dpi": 150,
+    "path.simplify_threshold": 0.2,
+    "svg.hashsalt": "yawsitter",
+}
+
+
+class Plot(NamedTuple):
+    """A figure to be drawn. draw: fills an empty matplotlib figure. note: what to see in it."""
+
+    key: str
+    title: str
+    note: str
+    size_in: tuple[float, float]
+    draw: Callable[[Any], None]
+
+
+class Drawn(NamedTuple):
+    plot: Plot
+    svg: bytes
+    png: bytes
+
+
+def drawn(plot: Plot) -> Drawn:
+    """The figure in both formats. Needs matplotlib, which is asked for here and nowhere sooner."""
+    import matplotlib
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context(_STYLE):
+        figure = Figure(figsize=plot.size_in, layout="constrained")
+        FigureCanvasAgg(figure)
+        plot.draw(figure)
+        svg, png = io.BytesIO(), io.BytesIO()
+        figure.savefig(svg, format="svg", metadata={"Date": None})
+        figure.savefig(png, format="png", metadata={"Software": None})
+    return Drawn(plot, svg.getvalue(), png.getvalue())
+
+
+_LEGEND_WIDTH = 100  # characters that fit beside each other above the widest figure
+
+
+def legend_above(figure: Any, axes: Any) -> None:
+    """One legend for the whole figure, from the lines of one of its axes; in as many rows as it takes."""
+    handles, labels = axes.get_legend_handles_labels()
+    rows = -(-sum(len(label) + 8 for label in labels) // _LEGEND_WIDTH)
+    figure.legend(handles, labels, loc="outside upper center", ncols=-(-len(labels) // rows))
