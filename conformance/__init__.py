@@ -1,0 +1,1 @@
+"""What clients say to the vehicle and what it answers: recorded, reduced, and written into docs/link.md."""

@@ -1,0 +1,39 @@
+"""A daemon whose link is recorded, so that what a client said and was answered can be held against docs/link.md."""
+
+import contextlib
+import time
+from collections.abc import Iterator
+from importlib import metadata
+from pathlib import Path
+
+from daemon_process import BOOT_LIMIT_S, INSTANCES, Daemon
+
+from conformance import clients
+from conformance.observation import frames, observe
+
+
+@contextlib.contextmanager
+def recorded(client: str, package: str | None, folder: Path, *arguments: str) -> Iterator[Daemon]:
+    """A daemon for `client`, which `package` provides. Afterwards: no fault, and nothing unanswered that was before."""
+    with _running(folder, "--record", str(folder / "recording"), *arguments) as daemon:
+        yield daemon
+        assert daemon.stop() == 0, daemon.log
+    assert ", 0 faults" in daemon.log
+    tlog = max((folder / "recording").glob("*.tlog"), key=lambda path: path.stat().st_size)
+    version = metadata.version(package) if package else ""
+    clients.note(client, observe(version, frames(tlog), daemon.instance + 1))
+
+
+def _running(folder: Path, *arguments: str) -> Daemon:
+    """A daemon that is up; another run of these tests may take an instance's ports between the look and the start."""
+    for _ in INSTANCES:
+        daemon = Daemon(folder, *arguments)
+        end_s = time.monotonic() + BOOT_LIMIT_S
+        while daemon.process.poll() is None and time.monotonic() < end_s:
+            if " instance " in daemon.log:
+                return daemon
+            time.sleep(0.05)
+        with daemon:  # end it
+            assert daemon.process.poll() is not None, f"not up within {BOOT_LIMIT_S:g} s"
+        assert "--instance" in daemon.log, daemon.log
+    raise AssertionError("all instances for tests are taken")

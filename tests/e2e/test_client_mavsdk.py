@@ -1,0 +1,173 @@
+"""MAVSDK, both generations, flying the real daemon over UDP: what its users' scripts do."""
+
+import asyncio
+import math
+from collections.abc import Iterator
+
+import pytest
+from mavsdk_drone import STEP_S, Drone, Generation, flown, until
+from recorded import recorded
+
+pytestmark = pytest.mark.e2e
+
+SPEED = 5
+METRE_DEG = 1.0 / 111_319.5  # of latitude
+NAN = math.nan
+
+
+@pytest.fixture(scope="module", params=list(Generation), ids=lambda generation: generation.value)
+def drone(request, tmp_path_factory) -> Iterator[tuple[asyncio.Runner, Drone]]:
+    """A connected vehicle, and the loop in which its plugins live; shared by all tests of one generation.
+
+    MAVSDK repeats its offboard targets 20 times a second of wall time; on a busy machine, at several times real time,
+    half a second of simulation is soon over.
+    """
+    generation, folder = request.param, tmp_path_factory.mktemp("mavsdk")
+    own = ("--speed", str(SPEED), "--set", "COM_OF_LOSS_T=20")
+    with recorded(generation.value, generation.package, folder, *own) as daemon, asyncio.Runner() as runner:
+        connection = Drone.connected(generation, f"udpout://127.0.0.1:{14580 + daemon.instance}")
+        yield runner, runner.run(connection.__aenter__())
+        runner.run(connection.__aexit__(None, None, None))
+
+
+@flown
+async def test_it_is_healthy_and_says_that_it_is_a_simulator(drone: Drone) -> None:
+    assert await drone.told("health_all_ok", bool)
+    product = await drone.info.get_product()
+    assert (product.vendor_id, product.product_id) == (0x5957, 0x5354)
+    version = await drone.info.get_version()
+    assert (version.flight_sw_major, version.flight_sw_minor) == (0, 1)
+    assert await drone.told("home", lambda home: abs(home.latitude_deg) > 1.0)
+    vtol = drone.types("telemetry").VtolState
+    assert await drone.told("vtol_state") == vtol.MC
+
+
+@flown
+async def test_its_pace_is_known(drone: Drone) -> None:
+    for _ in range(60):  # an average of MAVSDK's own that needs some messages
+        factor = await drone.info.get_speed_factor()
+        if abs(factor - SPEED) < 0.2 * SPEED:
+            return
+        await asyncio.sleep(0.5)
+    raise AssertionError(f"speed factor {factor}")
+
+
+@flown
+async def test_parameters_of_both_types_are_written_and_read_back(drone: Drone) -> None:
+    await drone.param.set_param_float("POS_X_P", 1.25)
+    assert await drone.param.get_param_float("POS_X_P") == 1.25
+    await drone.param.set_param_int("COM_OBL_RC_ACT", 4)
+    assert await drone.param.get_param_int("COM_OBL_RC_ACT") == 4
+    everything = await drone.param.get_all_params()
+    assert {p.name: p.value for p in everything.int_params}["COM_OBL_RC_ACT"] == 4
+    floats = {p.name: p.value for p in everything.float_params}
+    assert floats["POS_X_P"] == 1.25
+    assert len([name for name in floats if name.split("_")[0] in ("POS", "VEL", "ATT", "RATE")]) == 36
+
+
+@flown
+async def test_a_write_that_is_refused_says_why(drone: Drone) -> None:
+    error = drone.types("param").ParamError
+    with pytest.raises(error, match="VALUE_OUT_OF_RANGE"):
+        await drone.param.set_param_float("POS_X_P", 1e9)
+    with pytest.raises(error, match="DOES_NOT_EXIST"):
+        await drone.param.get_param_float("NO_SUCH_NAME")
+    with pytest.raises(error, match="TYPE_MISMATCH"):
+        await drone.param.set_param_int("POS_X_P", 3)
+
+
+@flown
+async def test_telemetry_comes_at_the_rate_that_was_set(drone: Drone) -> None:
+    await drone.telemetry.set_rate_attitude_quaternion(4.0)
+    stamps: list[int] = []
+
+    def enough(attitude) -> bool:
+        stamps.append(attitude.timestamp_us)
+        return len(stamps) >= 12
+
+    await until(drone.stream("telemetry", "attitude_quaternion"), enough, STEP_S)
+    gaps = [later - earlier for earlier, later in zip(stamps[-6:], stamps[-5:], strict=False)]
+    assert sum(gaps) / len(gaps) == pytest.approx(250_000, rel=0.1)  # of simulation time
+    for setter in (
+        *("position", "home", "in_air", "landed_state", "vtol_state", "attitude_euler", "velocity_ned", "raw_gps"),
+        *("gps_info", "battery", "actuator_output_status", "position_velocity_ned", "fixedwing_metrics", "imu"),
+        *("ground_truth", "unix_epoch_time", "altitude", "health"),
+    ):
+        await getattr(drone.telemetry, f"set_rate_{setter}")(10.0)
+    assert (await drone.told("battery")).remaining_percent == pytest.approx(100.0, abs=5.0)
+    assert (await drone.told("raw_gps")).latitude_deg == pytest.approx((await drone.told("home")).latitude_deg)
+    await drone.told("ground_truth", lambda truth: truth.latitude_deg > 1.0)
+
+
+@flown
+async def test_it_takes_off_to_the_height_that_was_set(drone: Drone) -> None:
+    await drone.action.set_takeoff_altitude(4.0)
+    assert await drone.action.get_takeoff_altitude() == 4.0
+    await drone.action.arm()
+    assert await drone.told("armed", bool)
+    await drone.action.takeoff()
+    landed = drone.types("telemetry").LandedState
+    await drone.told("landed_state", lambda state: state == landed.IN_AIR)
+    await drone.mode("HOLD")
+    assert (await drone.told("position")).relative_altitude_m == pytest.approx(4.0, abs=0.3)
+    assert await drone.told("in_air", bool)
+
+
+@flown
+async def test_it_goes_where_it_is_told_and_faces_there(drone: Drone) -> None:
+    start = await drone.airborne()
+    goal = start.latitude_deg + 5.0 * METRE_DEG
+    await drone.action.goto_location(goal, start.longitude_deg, start.absolute_altitude_m + 1.0, 90.0)
+    await drone.told("position", lambda p: abs(p.latitude_deg - goal) < 0.2 * METRE_DEG)
+    await drone.told("position", lambda p: abs(p.absolute_altitude_m - start.absolute_altitude_m - 1.0) < 0.2)
+    await drone.told("heading", lambda heading: abs(heading.heading_deg - 90.0) < 3.0)
+    await drone.action.hold()
+
+
+@flown
+async def test_a_mission_is_uploaded_read_back_flown_and_followed(drone: Drone) -> None:
+    here = await drone.airborne()
+    types = drone.types("mission")
+    item, camera, action = types.MissionItem, types.MissionItem.CameraAction, types.MissionItem.VehicleAction
+
+    def waypoint(north_m: float, east_m: float, through: bool = True):
+        lat = here.latitude_deg + north_m * METRE_DEG
+        lon = here.longitude_deg + east_m * METRE_DEG
+        free = (NAN, NAN, camera.NONE, NAN, NAN, 0.5, NAN, NAN, action.NONE)
+        return item(lat, lon, 5.0, 3.0, through, *free)
+
+    await drone.mission.set_return_to_launch_after_mission(False)
+    plan = types.MissionPlan([waypoint(0, 0), waypoint(5, 0), waypoint(5, 5, through=False)])
+    await drone.mission.upload_mission(plan)
+    back = (await drone.mission.download_mission()).mission_items
+    assert [round(i.latitude_deg, 7) for i in back] == [round(i.latitude_deg, 7) for i in plan.mission_items]
+    assert [i.speed_m_s for i in back] == [3.0, 3.0, 3.0]
+
+    await drone.mission.start_mission()
+    await drone.mode("MISSION")
+    seen: list[int] = []
+
+    def finished(progress) -> bool:
+        seen.append(progress.current)
+        return progress.current == progress.total == 3
+
+    await until(drone.stream("mission", "mission_progress"), finished, STEP_S)
+    assert seen == sorted(seen)
+    assert await drone.mission.is_mission_finished()
+    await drone.mode("HOLD")
+    there = await drone.told("position")
+    assert there.latitude_deg == pytest.approx(plan.mission_items[2].latitude_deg, abs=METRE_DEG)
+    await drone.mission.set_current_mission_item(0)
+    await drone.mission.clear_mission()
+
+
+@flown
+async def test_it_returns_lands_and_disarms_by_itself(drone: Drone) -> None:
+    await drone.airborne()
+    await drone.action.return_to_launch()
+    await drone.mode("RETURN_TO_LAUNCH")
+    await drone.action.land()
+    await drone.mode("LAND")
+    landed = drone.types("telemetry").LandedState
+    await drone.told("landed_state", lambda state: state == landed.ON_GROUND)
+    await drone.told("armed", lambda armed: not armed)
