@@ -20,6 +20,7 @@ NAMES = {
     "gains": "from a gain's write to the control step that uses it",
     "transfers": "the parameter list, and 500 mission items up and down, over UDP",
     "lateness": "the loop's deadlines beside a bare sleep loop's, and with a listener that never reads",
+    "flood": "20,000 messages a second from one address: heartbeats to another, the loop's deadlines; 1 min",
     "shares": "where the time of a simulated second goes",
 }
 

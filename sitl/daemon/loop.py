@@ -27,6 +27,7 @@ log = logging.getLogger(__name__)
 
 TURN_BUDGET_S = 0.02  # simulation that takes longer goes on in the next turn, after the sockets were looked at
 QUIET_S = 1.0  # between two reports of faults
+WAKES_MAX = 32  # for datagrams, between two turns: what a flood brings beyond that waits for the turn
 FACTOR_WINDOW_S = 1.0  # over which the achieved speed is averaged
 
 _TOLD = (EventKind.TEXT, EventKind.MODE, EventKind.ARMED)
@@ -96,11 +97,15 @@ class Loop:
                 return Ending.SHUTDOWN
             if self._endpoint.reboot_requested:
                 return Ending.REBOOT
-            while (now_s := self._clock()) < wake_s:
-                if self._sockets.wait(wake_s - now_s):
-                    now_s = self._clock()
-                    self._receive(now_s)
-                    self._send(now_s)
+            for _ in range(WAKES_MAX):
+                now_s = self._clock()
+                if now_s >= wake_s or not self._sockets.wait(wake_s - now_s):
+                    break
+                now_s = self._clock()
+                self._receive(now_s)
+                self._send(now_s)
+            else:
+                self._sockets.rest(wake_s - self._clock())
         return Ending.STOPPED
 
     def turn(self, wall_s: float) -> float:

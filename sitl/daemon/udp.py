@@ -4,11 +4,12 @@ import contextlib
 import errno
 import select
 import socket
+import time
 from collections.abc import Iterator, Mapping
 
 from sitl.daemon.config import Address, Port, SettingError
 
-DATAGRAMS_AT_ONCE = 32  # per socket; the loop looks at its deadline before it takes more
+DATAGRAMS_AT_ONCE = 256  # per socket; the loop looks at its deadline before it takes more
 _BUFFER_BYTES = 1 << 20
 _DATAGRAM_BYTES = 65535
 
@@ -32,6 +33,10 @@ class Sockets:
     def wait(self, timeout_s: float) -> bool:
         """Sleep until a datagram is there (True) or the time is over (False)."""
         return bool(select.select(self._readable, (), (), max(0.0, timeout_s))[0])
+
+    def rest(self, seconds: float) -> None:
+        """Sleep, whatever arrives."""
+        time.sleep(max(0.0, seconds))
 
     def receive(self) -> Iterator[tuple[Port, Address, bytes]]:
         """What has come in, without waiting."""

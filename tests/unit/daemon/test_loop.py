@@ -7,7 +7,7 @@ import pytest
 
 from sitl.daemon.clock import SLICE_US, TURN_S
 from sitl.daemon.config import Port
-from sitl.daemon.loop import QUIET_S, Ending, Loop
+from sitl.daemon.loop import QUIET_S, WAKES_MAX, Ending, Loop
 from sitl.mavlink.peers import PortKind
 from sitl.onboard.events import EventLog
 from sitl.onboard.modes import EventKind
@@ -105,6 +105,9 @@ class Wire:
         self._clock.now_s = end_s
         return False
 
+    def rest(self, seconds: float) -> None:
+        self._clock.now_s += max(0.0, seconds)
+
     def send(self, port, address, data) -> None:
         self.outgoing.append((self._clock(), port, address, data))
 
@@ -158,6 +161,15 @@ def test_requests_between_turns_do_not_shift_the_turns(bench) -> None:
     bench.run(1.0)
     assert bench.loop.lateness.turns == pytest.approx(1.0 / TURN_S, abs=2)
     assert bench.craft.now_us == pytest.approx(1_000_000, abs=2 * TURN_S * 1e6)
+
+
+def test_a_flood_wakes_the_loop_so_often_and_then_waits_for_the_turn(bench) -> None:
+    start_s = bench.clock()
+    bench.wire.script = [(start_s + k * 20e-6, Port.GCS, b"x") for k in range(1, 50_000)]
+    bench.run(1.0)
+    assert len(bench.link.received) == pytest.approx(50_000, abs=300)
+    assert len(bench.link.polled) <= (1.0 / TURN_S + 2) * (WAKES_MAX + 1)
+    assert bench.loop.lateness.turns == pytest.approx(1.0 / TURN_S, abs=2)
 
 
 def test_a_datagram_that_breaks_the_link_is_counted_and_survived(bench, caplog) -> None:
