@@ -51,7 +51,7 @@ def bare(name: str) -> Bare:
     """The rectangle as one trajectory, from standing, with the very constants that the vehicle flies with."""
     vehicle = Vehicle(load_vehicle(name))
     guidance = Guidance(int(Effort.FLY), _trajectory())
-    noisy = any(vehicle.spec.sensors[:4])
+    noisy = any(vehicle.spec.sensors)
     return Bare(vehicle._plants, vehicle._controllers, guidance, vehicle.loop, vehicle.step_us, noisy)
 
 

@@ -11,18 +11,37 @@ from sitl.control.cascade import Command, Memory, at_rest, cascade, standing_com
 from sitl.control.gains import Gains, Settings
 from sitl.control.guidance import Guidance
 from sitl.control.reference import Reference, sample
+from sitl.estimation.alignment import starting
+from sitl.estimation.corrections import at_rest as stood
+from sitl.estimation.corrections import with_baro, with_field, with_gnss
+from sitl.estimation.error_state import Estimate, Tuning, copied, nav_of, predicted, spread
+from sitl.frames import GRAVITY_M_S2
 from sitl.jit import kernel
 from sitl.model.airframe import Airframe, Gear
 from sitl.model.derivative import ActuatorCommand, Actuators, loads, total
 from sitl.model.integrate import step
 from sitl.model.rigid_body import State, accelerations
-from sitl.model.sensors import NOISES, Sensors, SensorState, observe, step_sensors
-from sitl.model.wind import GustState, Wind, step_gusts, wind_velocity
+from sitl.model.sensors import (
+    NOISES,
+    PERFECT,
+    Sensors,
+    SensorState,
+    baro,
+    due,
+    gnss,
+    magnetometer,
+    observe,
+    step_sensors,
+)
+from sitl.model.wind import CALM, GustState, Wind, step_gusts, wind_velocity
 from sitl.navigation import NavState
-from sitl.quaternion import Vec3
+from sitl.quaternion import Vec3, rotate_back
 
+Array = NDArray[np.float64]
 NOISE_COLUMNS = 3 + NOISES  # gusts, then sensors
 _OFF, _IDLE = 0, 1  # Effort.OFF, Effort.IDLE as plain numbers
+_COVARIANCE_HZ = 100.0
+_STILL_RAD_S, _STILL_M_S2 = 0.1, 0.5  # readings of an IMU that stands, at most this far from rest
 
 
 class Plant(NamedTuple):
@@ -37,11 +56,16 @@ class Plant(NamedTuple):
 
 
 class Controller(NamedTuple):
-    """All constants of the onboard side; `airframe` is what the controller believes the vehicle to be."""
+    """All constants of the onboard side; `airframe` is what the controller believes the vehicle to be.
+
+    estimating: 1.0 where the navigation state is the filter's estimate, 0.0 where it is the truth.
+    """
 
     airframe: Airframe
     gains: Gains
     settings: Settings
+    estimating: float
+    tuning: Tuning
 
 
 class LoopState(NamedTuple):
@@ -50,6 +74,7 @@ class LoopState(NamedTuple):
     state: State
     gusts: GustState
     sensors: SensorState
+    estimate: Estimate
     memory: Memory
 
 
@@ -73,15 +98,56 @@ TRACE_COLUMNS = (
 )
 
 
-def start(controller: Controller, state: State) -> LoopState:
-    """A loop at rest in the given state."""
-    zero = (0.0, 0.0, 0.0)
+def knowing(s: State) -> Estimate:
+    """The estimate of a vehicle that knows its motion in state `s`, as uncertain as after an alignment."""
+    q = (s.qw, s.qx, s.qy, s.qz)
+    rates = (s.p_rad_s, s.q_rad_s, s.r_rad_s)
+    force = rotate_back(q, (0.0, 0.0, -GRAVITY_M_S2))
+    position, velocity = (s.north_m, s.east_m, s.down_m), (s.v_north_m_s, s.v_east_m_s, s.v_down_m_s)
+    return starting(position, velocity, q, rates, force)
+
+
+def start(
+    controller: Controller, state: State, sensors: SensorState = PERFECT, estimate: Estimate | None = None
+) -> LoopState:
+    """A loop at rest in the given state; without an estimate the vehicle knows where it is."""
     return LoopState(
         state,
-        GustState(0.0, 0.0, 0.0, 0.0, 0.0),
-        SensorState(zero, zero, zero, zero),
+        CALM,
+        sensors._replace(gyro_rad_s=(state.p_rad_s, state.q_rad_s, state.r_rad_s)),
+        estimate if estimate is not None else knowing(state),
         at_rest(controller.airframe, controller.airframe.thrust_min_N),
     )
+
+
+@kernel
+def _standing(e: SensorState) -> bool:
+    """Whether the IMU reads what it reads at rest."""
+    w, f = e.gyro_rad_s, e.accel_m_s2
+    turns = math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+    weight = math.sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2])
+    return turns < _STILL_RAD_S and abs(weight - GRAVITY_M_S2) < _STILL_M_S2
+
+
+@kernel
+def _navigated(
+    e: Estimate, t: Tuning, p: Sensors, errors: SensorState, s: State, noise: Array, off: bool, now_us: int, dt_us: int
+) -> Estimate:
+    """The estimate one control step later, with every reading that is due. off: the motors are."""
+    dt_s = dt_us * 1e-6
+    e = predicted(e, errors.gyro_rad_s, errors.accel_m_s2, dt_s)
+    if due(_COVARIANCE_HZ, now_us, dt_us):
+        spread(e, t, max(1.0 / _COVARIANCE_HZ, dt_s))
+        if off and _standing(errors):
+            e = stood(e, t, dt_s)
+    if due(p.gnss_rate_Hz, now_us, dt_us):
+        fix = gnss(p, errors, s, noise)
+        e = with_gnss(e, t, fix.position_N, fix.velocity_N)
+    if due(p.baro_rate_Hz, now_us, dt_us):
+        e = with_baro(e, t, baro(p, errors, s, noise))
+    if due(p.mag_rate_Hz, now_us, dt_us):
+        e = with_field(e, t, magnetometer(p, errors, s, noise))
+    return e
 
 
 @kernel
@@ -90,41 +156,39 @@ def run(
     controllers: Sequence[Controller],
     guidance: Guidance,
     loop: LoopState,
-    noise: NDArray[np.float64],
+    noise: Array,
     start_us: int,
     dt_us: int,
     steps: int,
-    trace: NDArray[np.float64],
+    trace: Array,
 ) -> tuple[LoopState, Observed]:
     """`steps` control steps of `dt_us` from simulation time `start_us`.
 
     plants, controllers: one element each, from records.packed.
     noise: (steps, NOISE_COLUMNS) standard normal numbers, or (0, NOISE_COLUMNS): none.
+    loop: its covariance is left as it is; the returned one is another.
     trace: (steps, len(TRACE_COLUMNS)) is filled with a row a step, or (0, …): no trace.
     """
     plant, controller = plants[0], controllers[0]
     s, gusts, errors, memory = loop.state, loop.gusts, loop.sensors, loop.memory
+    estimating, noisy = controller.estimating > 0.0, noise.shape[0] > 0
+    estimate = copied(loop.estimate)
+    quiet, mass = np.zeros(NOISES), plant.airframe.mass_kg
     dt_s = dt_us * 1e-6
     h_s = dt_s / plant.substeps
     wind_N = wind_velocity(plant.wind, gusts, -s.down_m)
-    nav = observe(plant.sensors, errors, s)
+    nav = nav_of(estimate) if estimating else observe(plant.sensors, errors, s)
     command = standing_command(nav, 0.0)
     reference = sample(guidance.trajectory, start_us * 1e-6)
     for k in range(steps):
         t_s = (start_us + k * dt_us) * 1e-6
-        if noise.shape[0] > 0:
+        if noisy:
             n = noise[k]
             rn, re, rd = s.v_north_m_s - wind_N[0], s.v_east_m_s - wind_N[1], s.v_down_m_s - wind_N[2]
             speed = math.sqrt(rn * rn + re * re + rd * rd)
             gusts = step_gusts(plant.wind, gusts, -s.down_m, speed, (n[0], n[1], n[2]), dt_s)
-            errors = step_sensors(
-                plant.sensors,
-                errors,
-                (n[3], n[4], n[5], n[6], n[7], n[8], n[9], n[10], n[11], n[12], n[13], n[14]),
-                dt_s,
-            )
             wind_N = wind_velocity(plant.wind, gusts, -s.down_m)
-        nav = observe(plant.sensors, errors, s)
+        nav = nav_of(estimate) if estimating else observe(plant.sensors, errors, s)
         if guidance.effort == _OFF:
             command = standing_command(nav, 0.0)
             reference = sample(guidance.trajectory, t_s)
@@ -148,19 +212,29 @@ def run(
                 trace[k, 33 + i] = reference[i]
         for _ in range(plant.substeps):
             s = step(plant.airframe, plant.gear, plant.actuators, s, actuators, wind_N, h_s)
+        if estimating or noisy:
+            felt = (0.0, 0.0, 0.0)
+            if estimating:
+                force, _ = total(loads(plant.airframe, plant.gear, s, wind_N))
+                felt = (force[0] / mass, force[1] / mass, force[2] / mass)
+            n = noise[k, 3:] if noisy else quiet
+            errors = step_sensors(plant.sensors, errors, (s.p_rad_s, s.q_rad_s, s.r_rad_s), felt, n, dt_s)
+            if estimating:
+                off = guidance.effort == _OFF
+                now_us = start_us + (k + 1) * dt_us
+                estimate = _navigated(estimate, controller.tuning, plant.sensors, errors, s, n, off, now_us, dt_us)
     if guidance.effort <= _IDLE and steps > 0:
         memory = at_rest(controller.airframe, controller.airframe.thrust_min_N)
     acting = loads(plant.airframe, plant.gear, s, wind_N)
     force, moment = total(acting)
     linear, _ = accelerations(plant.airframe, s, force, moment)
-    m = plant.airframe.mass_kg
     observed = Observed(
-        observe(plant.sensors, errors, s),
+        nav_of(estimate) if estimating else observe(plant.sensors, errors, s),
         command,
         reference,
         wind_N,
-        (force[0] / m, force[1] / m, force[2] / m),
+        (force[0] / mass, force[1] / mass, force[2] / mass),
         linear,
         acting.feet_down,
     )
-    return LoopState(s, gusts, errors, memory), observed
+    return LoopState(s, gusts, errors, estimate, memory), observed

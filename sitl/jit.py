@@ -32,7 +32,7 @@ def _cache_root() -> Path:
 
 def _digest() -> str:
     digest = hashlib.sha256(numba.__version__.encode())
-    for folder in ("", "model", "control"):
+    for folder in ("", "model", "control", "estimation"):
         for source in sorted((_SOURCES / folder).glob("*.py")):
             digest.update(source.name.encode() + source.read_bytes())
     return digest.hexdigest()[:16]

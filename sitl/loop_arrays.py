@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from sitl.closed_loop import Controller, LoopState, Observed, Plant, run
 from sitl.control.cascade import Command, Memory
+from sitl.control.disturbance import Disturbance, Flaps
 from sitl.control.feedforward import Trim
 from sitl.control.guidance import Guidance
 from sitl.control.reference import Reference
+from sitl.estimation.error_state import ERRORS, Estimate
 from sitl.jit import kernel
 from sitl.model.rigid_body import State
 from sitl.model.sensors import SensorState
@@ -22,7 +24,8 @@ from sitl.navigation import NavState
 from sitl.quaternion import Vec3
 
 Array = NDArray[np.float64]
-LOOP_SIZE = 70
+_GUSTS, _SENSORS, _ESTIMATE, _COVARIANCE, _MEMORY = 17, 22, 41, 64, 64 + ERRORS * ERRORS  # the state begins at 0
+LOOP_SIZE = _MEMORY + 51
 OBSERVED_SIZE = 52
 _NAV, _COMMAND, _REFERENCE = slice(0, 13), slice(13, 28), slice(28, 42)
 
@@ -38,19 +41,43 @@ def _trim(x: Array, i: int) -> Trim:
 
 
 @kernel
+def _sensors(x: Array, i: int) -> SensorState:
+    return SensorState(
+        _vec(x, i), _vec(x, i + 3), _vec(x, i + 6), _vec(x, i + 9), x[i + 12], _vec(x, i + 13), _vec(x, i + 16)
+    )
+
+
+@kernel
+def _estimate(x: Array, i: int) -> Estimate:
+    return Estimate(
+        _vec(x, i), _vec(x, i + 3), (x[i + 6], x[i + 7], x[i + 8], x[i + 9]), _vec(x, i + 10), _vec(x, i + 13),
+        x[i + 16], _vec(x, i + 17), _vec(x, i + 20), x[_COVARIANCE:_MEMORY].reshape((ERRORS, ERRORS)),
+    )  # fmt: skip
+
+
+@kernel
+def _memory(x: Array, i: int) -> Memory:
+    return Memory(
+        _vec(x, i), _vec(x, i + 3), _vec(x, i + 6), _vec(x, i + 9), _vec(x, i + 12), _vec(x, i + 15),
+        _trim(x, i + 18), _trim(x, i + 24), x[i + 30], x[i + 31],
+        Flaps(x[i + 32], x[i + 33]),
+        Disturbance(_vec(x, i + 34), _vec(x, i + 37), _vec(x, i + 40), _vec(x, i + 43), x[i + 46]),
+        x[i + 47], x[i + 48], x[i + 49], x[i + 50],
+    )  # fmt: skip
+
+
+@kernel
 def loop_of(x: Array) -> LoopState:
-    """The loop's state from its array."""
+    """The loop's state from its array, whose part with the covariance it shares."""
     return LoopState(
         State(
             x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11], x[12], x[13], x[14], x[15], x[16]
         ),
         GustState(x[17], x[18], x[19], x[20], x[21]),
-        SensorState(_vec(x, 22), _vec(x, 25), _vec(x, 28), _vec(x, 31)),
-        Memory(
-            _vec(x, 34), _vec(x, 37), _vec(x, 40), _vec(x, 43), _vec(x, 46), _vec(x, 49), _trim(x, 52), _trim(x, 58),
-            x[64], x[65], x[66], x[67], x[68], x[69],
-        ),
-    )  # fmt: skip
+        _sensors(x, _SENSORS),
+        _estimate(x, _ESTIMATE),
+        _memory(x, _MEMORY),
+    )
 
 
 @kernel
@@ -59,28 +86,62 @@ def _put3(x: Array, i: int, v: Vec3) -> None:
 
 
 @kernel
+def _put_sensors(x: Array, i: int, e: SensorState) -> None:
+    _put3(x, i, e.gyro_bias)
+    _put3(x, i + 3, e.accel_bias)
+    _put3(x, i + 6, e.mag_bias)
+    _put3(x, i + 9, e.gnss_wander)
+    x[i + 12] = e.baro_wander
+    _put3(x, i + 13, e.gyro_rad_s)
+    _put3(x, i + 16, e.accel_m_s2)
+
+
+@kernel
+def _put_estimate(x: Array, i: int, e: Estimate) -> None:
+    _put3(x, i, e.position_N)
+    _put3(x, i + 3, e.velocity_N)
+    x[i + 6], x[i + 7], x[i + 8], x[i + 9] = e.q_NB[0], e.q_NB[1], e.q_NB[2], e.q_NB[3]
+    _put3(x, i + 10, e.gyro_bias)
+    _put3(x, i + 13, e.accel_bias)
+    x[i + 16] = e.baro_offset_m
+    _put3(x, i + 17, e.rates_B)
+    _put3(x, i + 20, e.force_B)
+    for j in range(ERRORS):
+        for k in range(ERRORS):
+            x[_COVARIANCE + ERRORS * j + k] = e.covariance[j, k]
+
+
+@kernel
+def _put_memory(x: Array, i: int, m: Memory) -> None:
+    _put3(x, i, m.position_integral)
+    _put3(x, i + 3, m.velocity_integral)
+    _put3(x, i + 6, m.attitude_integral)
+    _put3(x, i + 9, m.rate_integral)
+    _put3(x, i + 12, m.velocity_error_smoothed)
+    _put3(x, i + 15, m.rate_error_smoothed)
+    for k in range(6):
+        x[i + 18 + k] = m.reference_trim[k]
+        x[i + 24 + k] = m.command_trim[k]
+    x[i + 30], x[i + 31], x[i + 32], x[i + 33] = m.flow_left_N, m.flow_right_N, m.flaps.left_rad, m.flaps.right_rad
+    d = m.disturbance
+    _put3(x, i + 34, d.acceleration_N)
+    _put3(x, i + 37, d.angular_B)
+    _put3(x, i + 40, d.velocity_N)
+    _put3(x, i + 43, d.rates_B)
+    x[i + 46] = d.observing
+    x[i + 47], x[i + 48], x[i + 49], x[i + 50] = m.thrust_short, m.roll_short, m.pitch_short, m.yaw_short
+
+
+@kernel
 def put_loop(x: Array, loop: LoopState) -> None:
     """The loop's state into its array."""
     for i in range(17):
         x[i] = loop.state[i]
     for i in range(5):
-        x[17 + i] = loop.gusts[i]
-    e, m = loop.sensors, loop.memory
-    _put3(x, 22, e.position)
-    _put3(x, 25, e.velocity)
-    _put3(x, 28, e.attitude)
-    _put3(x, 31, e.rate)
-    _put3(x, 34, m.position_integral)
-    _put3(x, 37, m.velocity_integral)
-    _put3(x, 40, m.attitude_integral)
-    _put3(x, 43, m.rate_integral)
-    _put3(x, 46, m.velocity_error_smoothed)
-    _put3(x, 49, m.rate_error_smoothed)
-    for i in range(6):
-        x[52 + i] = m.reference_trim[i]
-        x[58 + i] = m.command_trim[i]
-    x[64], x[65] = m.flow_left_N, m.flow_right_N
-    x[66], x[67], x[68], x[69] = m.thrust_short, m.roll_short, m.pitch_short, m.yaw_short
+        x[_GUSTS + i] = loop.gusts[i]
+    _put_sensors(x, _SENSORS, loop.sensors)
+    _put_estimate(x, _ESTIMATE, loop.estimate)
+    _put_memory(x, _MEMORY, loop.memory)
 
 
 @kernel

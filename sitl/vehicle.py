@@ -10,8 +10,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sitl.closed_loop import NOISE_COLUMNS, TRACE_COLUMNS, Controller, LoopState, Plant, start
+from sitl.closed_loop import NOISE_COLUMNS, TRACE_COLUMNS, Controller, LoopState, Plant, knowing, start
+from sitl.control.disturbance import Bandwidth
 from sitl.control.gains import GAIN_NAMES, PerAxis, Settings, from_names
+from sitl.estimation.alignment import aligned
+from sitl.estimation.error_state import Tuning
 from sitl.frames import GRAVITY_M_S2, standing
 from sitl.geodesy import GeoPoint
 from sitl.loop_arrays import (
@@ -28,6 +31,7 @@ from sitl.model.airframe import Airframe
 from sitl.model.airframe import description as airframe_description
 from sitl.model.derivative import loads as plant_loads
 from sitl.model.rigid_body import State
+from sitl.model.sensors import NOISES, PERFECT, TURN_ON, magnetometer, step_sensors, switched_on
 from sitl.model.wind import Wind
 from sitl.onboard.commander import Commander
 from sitl.onboard.declarations import declarations
@@ -36,7 +40,7 @@ from sitl.onboard.mission import Mission
 from sitl.onboard.offboard import Offboard
 from sitl.onboard.parameters import ParameterRefusal, Parameters
 from sitl.onboard.store import MemoryStore, Store
-from sitl.quaternion import Vec3
+from sitl.quaternion import Vec3, rotate_back
 from sitl.records import packed
 from sitl.snapshot import Battery, Snapshot
 from sitl.strict_yaml import ConfigError
@@ -119,13 +123,14 @@ class Vehicle:
         """Back to standing at the start point, motors off; simulation time, parameters and plan stay."""
         self._random = np.random.Generator(np.random.PCG64(self.seed))
         self._generation = -1
+        self._controller: Controller | None = None
         self._build_constants()
         q = standing(self.heading_rad, self._gear.standing_pitch_rad)
         zero = (0.0, 0.0, 0.0)
         state = State(*zero, *zero, *q, *zero, 0.0, 0.0, 0.0, 0.0)
         self._loop_array = np.zeros(LOOP_SIZE)
         self._observed_array = np.zeros(OBSERVED_SIZE)
-        put_loop(self._loop_array, start(self._controller, state))
+        put_loop(self._loop_array, self._standing(state))
         self._energy_J = 0.0
         self._power_W = _IDLE_W
         self._snapshot: Snapshot | None = None
@@ -134,6 +139,18 @@ class Vehicle:
         self.commander.restart(self.heading_rad)
         self._guidance = self.commander.guidance
         self._run(0, _NO_TRACE)
+
+    def _standing(self, state: State) -> LoopState:
+        """The loop of a vehicle that stands in `state`, its sensors switched on and the filter aligned to them."""
+        sensors, noise = self.spec.sensors, np.zeros(NOISES)
+        if any(sensors):
+            noise = self._random.standard_normal(NOISES)
+        errors = switched_on(sensors, self._random.standard_normal(TURN_ON)) if any(sensors) else PERFECT
+        felt = rotate_back((state.qw, state.qx, state.qy, state.qz), (0.0, 0.0, -GRAVITY_M_S2))
+        errors = step_sensors(sensors, errors, (0.0, 0.0, 0.0), felt, noise, self.step_us * 1e-6)
+        estimate = aligned(errors.accel_m_s2, magnetometer(sensors, errors, state, noise))
+        assert self._controller is not None
+        return start(self._controller, state, errors, estimate)
 
     def settings(self) -> Settings:
         """The cascade's settings as the parameters in force have them."""
@@ -148,11 +165,28 @@ class Vehicle:
             velocity_d_tau_s=p["CTL_VEL_D_TAU"],
             rate_d_tau_s=p["CTL_RATE_D_TAU"],
             motor_tau_s=self.spec.actuators.motor_tau_s,
+            flap_tau_s=self.spec.actuators.flap_tau_s,
+            disturbance=Bandwidth(p["CTL_DIST_F_BW"], p["CTL_DIST_M_BW"]),
             slipstream_floor_N=p["CTL_SLIP_FLOOR"] * a.mass_kg * GRAVITY_M_S2,
             thrust_floor_N=p["CTL_THR_FLOOR"],
             thrust_recover_N=p["CTL_THR_RECOVER"],
             braking_rad_s2=PerAxis(p["CTL_BRAKE_X"], p["CTL_BRAKE_Y"], p["CTL_BRAKE_Z"]),
             lean_max_rad=math.radians(p["MPC_TILTMAX_AIR"]),
+        )
+
+    def tuning(self) -> Tuning:
+        """What the navigation filter believes of its sensors, as the parameters in force have it."""
+        p = self.parameters
+        return Tuning(
+            gyro_noise_rad_s_rtHz=p["EST_GYR_NOISE"],
+            accel_noise_m_s2_rtHz=p["EST_ACC_NOISE"],
+            gyro_walk_rad_s2_rtHz=p["EST_GYR_WALK"],
+            accel_walk_m_s3_rtHz=p["EST_ACC_WALK"],
+            gnss_level_m=p["EST_GPS_P_NOISE"],
+            gnss_height_m=p["EST_GPS_Z_NOISE"],
+            gnss_velocity_m_s=p["EST_GPS_V_NOISE"],
+            baro_m=p["EST_BARO_NOISE"],
+            heading_rad=p["EST_MAG_NOISE"],
         )
 
     def _build_constants(self) -> None:
@@ -165,9 +199,12 @@ class Vehicle:
         wind = Wind(p["SIM_WIND_N"], p["SIM_WIND_E"], p["SIM_WIND_D"], p["SIM_GUST"])
         plant = Plant(a, self._gear, self.spec.actuators, self.spec.sensors, wind, self.spec.substeps)
         gains = from_names({name: p[name] for name in GAIN_NAMES})
-        self._controller = Controller(self._believed, gains, self.settings())
-        self._noisy = wind.gust_m_s > 0.0 or any(self.spec.sensors[:4])
-        self._plants, self._controllers = packed(plant), packed(self._controller)
+        estimating = float(p["EST_ENABLE"])
+        if self._controller is not None and estimating > self._controller.estimating:
+            self.loop = self.loop._replace(estimate=knowing(self.loop.state))
+        controller = self._controller = Controller(self._believed, gains, self.settings(), estimating, self.tuning())
+        self._noisy = wind.gust_m_s > 0.0 or any(self.spec.sensors)
+        self._plants, self._controllers = packed(plant), packed(controller)
 
     @property
     def loop(self) -> LoopState:

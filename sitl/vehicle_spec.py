@@ -13,6 +13,7 @@ from sitl.model import airframe
 from sitl.model.airframe import Airframe, LoadedAirframe
 from sitl.model.derivative import Actuators
 from sitl.model.sensors import Sensors
+from sitl.quantities import Entry, check_names, refusal
 from sitl.strict_yaml import ConfigError
 
 _HERE = Path(__file__).parent
@@ -36,11 +37,8 @@ class ActuatorsFile(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class SensorsFile(msgspec.Struct, forbid_unknown_fields=True):
-    position_noise_m: float
-    velocity_noise_m_s: float
-    attitude_noise_rad: float
-    rate_noise_rad_s: float
-    correlation_s: float
+    description: str
+    sensors: dict[str, Entry]
 
 
 class VehicleFile(msgspec.Struct, forbid_unknown_fields=True):
@@ -49,7 +47,7 @@ class VehicleFile(msgspec.Struct, forbid_unknown_fields=True):
     gains: str
     control_rate_hz: int
     actuators: ActuatorsFile
-    sensors: SensorsFile
+    sensors: str
     parameters: dict[str, float] = {}
 
 
@@ -62,6 +60,7 @@ class VehicleSpec(NamedTuple):
     gains_name: str
     gains: dict[str, float]  # the 36 by parameter name
     actuators: Actuators
+    sensors_name: str
     sensors: Sensors
     control_rate_hz: int
     step_us: int  # control period
@@ -88,15 +87,11 @@ def _resolve(kind: str, name: str, beside: Path | None) -> Path:
 def load_gains(path: Path) -> dict[str, float]:
     """The 36 gains of a gains file by parameter name. Raises ConfigError."""
     rows = strict_yaml.load(path, GainsFile).gains
-    wanted = {name[:-2] for name in GAIN_NAMES}
-    for problem, names in (("missing", wanted - set(rows)), ("unknown", set(rows) - wanted)):
-        if names:
-            raise ConfigError(f"{path}: gains: {problem}: {', '.join(sorted(names))}")
+    check_names(path, "gains", list(rows), [name[:-2] for name in GAIN_NAMES])
     gains = {name: float(getattr(rows[name[:-2]], name[-1])) for name in GAIN_NAMES}
     for name, value in gains.items():
         if not (math.isfinite(value) and value >= 0.0):
-            line = strict_yaml.line_of(path.read_text(encoding="utf-8"), f"gains.{name[:-2]}")
-            raise ConfigError(f"{path}:{line}: gains.{name[:-2]}.{name[-1]}: {value} must be 0 or greater")
+            raise refusal(path, f"gains.{name[:-2]}.{name[-1]}", f"{value} must be 0 or greater")
     return gains
 
 
@@ -112,22 +107,28 @@ def with_airframe(
     return spec._replace(airframe=flown), airframe.changed(a, believed)
 
 
+def load_sensors(path: Path) -> Sensors:
+    """The sensors of a file; what it leaves out is zero: no noise, no bias, no readings. Raises ConfigError."""
+    numbers = strict_yaml.load(path, SensorsFile).sensors
+    check_names(path, "sensors", list(numbers), Sensors._fields, complete=False)
+    for name, entry in numbers.items():
+        if not (math.isfinite(entry.value) and entry.value >= 0.0):
+            raise refusal(path, f"sensors.{name}", f"{entry.value} must be 0 or greater")
+    return Sensors(*(numbers[name].value if name in numbers else 0.0 for name in Sensors._fields))
+
+
 def load_vehicle(name_or_path: str) -> VehicleSpec:
     """The vehicle of a bundled name ('yawsitter') or of a YAML file. Raises ConfigError."""
     path = _resolve("vehicles", name_or_path, None)
     content = strict_yaml.load(path, VehicleFile)
-    text = path.read_text(encoding="utf-8")
-
-    def refuse(field: str, message: str) -> None:
-        raise ConfigError(f"{path}:{strict_yaml.line_of(text, field)}: {field}: {message}")
-
     rate = content.control_rate_hz
     if not (10 <= rate <= 5000 and 1_000_000 % rate == 0):
-        refuse("control_rate_hz", f"{rate} must be in 10 … 5000 and divide 1,000,000 (whole microseconds a step)")
-    for group in ("actuators", "sensors"):
-        for field, value in msgspec.structs.asdict(getattr(content, group)).items():
-            if not (math.isfinite(value) and value >= 0.0):
-                refuse(f"{group}.{field}", f"{value} must be 0 or greater")
+        raise refusal(
+            path, "control_rate_hz", f"{rate} must be in 10 … 5000 and divide 1,000,000 (whole microseconds a step)"
+        )
+    for field, value in msgspec.structs.asdict(content.actuators).items():
+        if not (math.isfinite(value) and value >= 0.0):
+            raise refusal(path, f"actuators.{field}", f"{value} must be 0 or greater")
     step_us = 1_000_000 // rate
     return VehicleSpec(
         name=path.stem,
@@ -136,7 +137,8 @@ def load_vehicle(name_or_path: str) -> VehicleSpec:
         gains_name=Path(content.gains).stem,
         gains=load_gains(_resolve("gains", content.gains, path.parent)),
         actuators=Actuators(**msgspec.structs.asdict(content.actuators)),
-        sensors=Sensors(**msgspec.structs.asdict(content.sensors)),
+        sensors_name=Path(content.sensors).stem,
+        sensors=load_sensors(_resolve("sensors", content.sensors, path.parent)),
         control_rate_hz=rate,
         step_us=step_us,
         substeps=max(1, math.ceil(step_us * 1e-6 / _LONGEST_STEP_S - 1e-9)),

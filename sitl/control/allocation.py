@@ -2,8 +2,9 @@
 
 from typing import NamedTuple
 
+from sitl.control.flow import Flow
 from sitl.jit import kernel
-from sitl.model.aerodynamics import flap_pressure, wing_loads
+from sitl.model.aerodynamics import flap_pressure
 from sitl.model.airframe import Airframe
 from sitl.model.propulsion import wake_speed
 from sitl.quaternion import Vec3
@@ -25,32 +26,20 @@ class Allocation(NamedTuple):
 
 
 @kernel
-def allocate(
-    a: Airframe,
-    force_x: float,
-    moment: Vec3,
-    u: float,
-    w: float,
-    flow_left_N: float,
-    flow_right_N: float,
-    flap_floor_N: float,
-    floor_N: float,
-) -> Allocation:
+def allocate(a: Airframe, force_x: float, moment: Vec3, flow: Flow, flap_floor_N: float, floor_N: float) -> Allocation:
     """Thrusts [N] and flap angles [rad] that give `force_x` [N] along body x and `moment` [N·m].
 
-    u, w: air velocity in B [m/s]. flow_*_N: each propeller's thrust as it shapes the slipstream now (the previous
-    command: paper, below Eq. 11). flap_floor_N: thrust of one propeller below which the flaps' pressure is not believed
-    to fall (hover's, as printed, keeps the flaps from overreacting). floor_N: least total thrust.
+    flow: with the propellers' thrust as it shapes the slipstreams now (the previous command: paper, below Eq. 11).
+    flap_floor_N: thrust of one propeller below which the flaps' pressure is not believed to fall (hover's, as printed,
+    keeps the flaps from overreacting). floor_N: least total thrust.
 
     T_L,R = (T ± ΔT)/2 with T = F_x − F_wing,x and ΔT = (M_z − M_wing,z) / l_y. The flaps take what is left of roll and
     pitch once the wing and the propellers' torque have had their part:
     q_L δ_L + q_R δ_R = M_y' / (S_f c̄ C_Mδ),   q_L δ_L − q_R δ_R = M_x' / (lever S_f C_Lδ).
     Yaw goes before thrust, and pitch before roll but for a share of the flaps that roll can count on.
     """
-    wake_left, wake_right = wake_speed(a, flow_left_N, u), wake_speed(a, flow_right_N, u)
-    wing_f, wing_m = wing_loads(a, u, w, wake_left, wake_right)
-
     low, high = a.thrust_min_N, a.thrust_max_N
+    wing_f, wing_m = flow.wing_force, flow.wing_moment
     wanted_difference = (moment[2] - wing_m[2]) / a.prop_arm_m
     difference = max(low - high, min(high - low, wanted_difference))
     wanted_total = max(floor_N, force_x - wing_f[0])
@@ -60,8 +49,8 @@ def allocate(
     torque = a.torque_coefficient / a.thrust_coefficient * difference
     pitch = (moment[1] - wing_m[1]) / (a.flap_area_m2 * a.chord_m * a.flap_moment_slope)
     roll = (moment[0] - wing_m[0] - torque) / (a.flap_area_m2 * a.flap_roll_arm_m * a.flap_lift_slope)
-    q_left = flap_pressure(a, w, wake_speed(a, max(flow_left_N, flap_floor_N), u))
-    q_right = flap_pressure(a, w, wake_speed(a, max(flow_right_N, flap_floor_N), u))
+    q_left = flap_pressure(a, flow.w, wake_speed(a, max(flow.thrust_left_N, flap_floor_N), flow.u))
+    q_right = flap_pressure(a, flow.w, wake_speed(a, max(flow.thrust_right_N, flap_floor_N), flow.u))
     # the two flaps as a symmetric and a differential part, so that pitch can be served first
     flap_left, flap_right = (pitch + roll) / (2.0 * q_left), (pitch - roll) / (2.0 * q_right)
     m = a.flap_max_rad

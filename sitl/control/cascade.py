@@ -5,7 +5,9 @@ from typing import NamedTuple
 
 from sitl.control.allocation import allocate
 from sitl.control.attitude import attitude_of, braked, error_quaternion, error_yxz, rate_command, rates_of
+from sitl.control.disturbance import Disturbance, Flaps, none, observed
 from sitl.control.feedforward import Trim, invert, refined
+from sitl.control.flow import flow_at
 from sitl.control.gains import Gains, Settings
 from sitl.control.guidance import Guidance
 from sitl.control.pid import integrated, smoothed
@@ -41,6 +43,8 @@ class Memory(NamedTuple):
     command_trim: Trim
     flow_left_N: float  # thrust as it shapes the slipstream, after the motors' lag
     flow_right_N: float
+    flaps: Flaps  # after the flaps' lag
+    disturbance: Disturbance
     thrust_short: float
     roll_short: float
     pitch_short: float
@@ -73,7 +77,8 @@ def at_rest(a: Airframe, thrust_each_N: float) -> Memory:
     zero = (0.0, 0.0, 0.0)
     weight = a.mass_kg * GRAVITY_M_S2
     hover = invert(a, (0.0, 0.0, -weight), zero, 0.0, 0.5 * math.pi, weight, 8)
-    return Memory(zero, zero, zero, zero, zero, zero, hover, hover, thrust_each_N, thrust_each_N, 0.0, 0.0, 0.0, 0.0)
+    t = thrust_each_N
+    return Memory(zero, zero, zero, zero, zero, zero, hover, hover, t, t, Flaps(0.0, 0.0), none(), 0.0, 0.0, 0.0, 0.0)
 
 
 @kernel
@@ -150,6 +155,20 @@ def _filtered_rate(smoothed_error: Vec3, error: Vec3, dt_s: float, tau_s: float)
 
 
 @kernel
+def _approach(dt_s: float, tau_s: float) -> float:
+    """How much of the way to its command a first-order actuator goes in a step."""
+    return 1.0 - math.exp(-dt_s / tau_s) if tau_s > 0.0 else 1.0
+
+
+@kernel
+def _spun_up(thrust_N: float, command_N: float, gain: float) -> float:
+    """A propeller's thrust one step later: the rotor's speed, thus the thrust's root, approaches its command."""
+    root = math.sqrt(thrust_N)
+    root += gain * (math.sqrt(max(command_N, 0.0)) - root)
+    return root * root
+
+
+@kernel
 def cascade(
     a: Airframe, gains: Gains, s: Settings, guidance: Guidance, m: Memory, nav: NavState, t_s: float, dt_s: float
 ) -> tuple[Command, Memory, Reference]:
@@ -163,6 +182,12 @@ def cascade(
     ref = sample(guidance.trajectory, t_s)
     thrust_held = m.thrust_short > 0.0
     tilt_held = m.pitch_short > 0.0 or m.yaw_short > 0.0
+
+    # what acts now, and what of it the force laws don't explain
+    u, _, w = rotate_back(q_NB, velocity)
+    flow = flow_at(a, u, w, m.flow_left_N, m.flow_right_N)
+    disturbance = observed(a, m.disturbance, nav, flow, m.flaps, s.disturbance, guidance.aloft > 0.0, dt_s)
+    unexplained, turning = disturbance.acceleration_N, disturbance.angular_B
 
     # position
     fp = (guidance.follow_position_north, guidance.follow_position_east, guidance.follow_position_down)
@@ -212,9 +237,9 @@ def cascade(
         velocity_integral,
         velocity_error_rate,
         (
-            ref.a_north_m_s2 if fv[0] == 0.0 else k * ref.a_north_m_s2,
-            ref.a_east_m_s2 if fv[1] == 0.0 else k * ref.a_east_m_s2,
-            ref.a_down_m_s2 if fv[2] == 0.0 else k * ref.a_down_m_s2,
+            (ref.a_north_m_s2 if fv[0] == 0.0 else k * ref.a_north_m_s2) - unexplained[0],
+            (ref.a_east_m_s2 if fv[1] == 0.0 else k * ref.a_east_m_s2) - unexplained[1],
+            (ref.a_down_m_s2 if fv[2] == 0.0 else k * ref.a_down_m_s2) - unexplained[2],
         ),
         s.acceleration_max_m_s2,
         s.lean_max_rad,
@@ -236,6 +261,12 @@ def cascade(
             a.jyy_kg_m2 * (after.pitch_rad - 2.0 * now.pitch_rad + before.pitch_rad) / (_LOOK_S * _LOOK_S),
             a.jzz_kg_m2 * (after.lean_rad - 2.0 * now.lean_rad + before.lean_rad) / (_LOOK_S * _LOOK_S),
         )
+
+    moment_ff = (
+        moment_ff[0] - a.jxx_kg_m2 * turning[0],
+        moment_ff[1] - a.jyy_kg_m2 * turning[1],
+        moment_ff[2] - a.jzz_kg_m2 * turning[2],
+    )
 
     # pitch and lean: the attitude whose trim gives the wanted force at the present velocity
     trim = refined(
@@ -270,11 +301,10 @@ def cascade(
 
     # allocation
     force_x = rotate_back(q_NB, force_N)[0]
-    u, _, w = rotate_back(q_NB, velocity)
     # thrust makes the flaps work: more of it while the nose is further than 45° off its target
     off = max(0.0, min(1.0, 1.0 - nose / _NEAR_COSINE))
     floor_N = s.thrust_floor_N + off * max(0.0, s.thrust_recover_N - s.thrust_floor_N)
-    x = allocate(a, force_x, demand, u, w, m.flow_left_N, m.flow_right_N, 0.5 * s.slipstream_floor_N, floor_N)
+    x = allocate(a, force_x, demand, flow, 0.5 * s.slipstream_floor_N, floor_N)
     command = Command(
         target[0], target[1], target[2], target[3],
         rate_target[0], rate_target[1], rate_target[2],
@@ -282,6 +312,7 @@ def cascade(
         v_command[0], v_command[1], v_command[2],
         max(max(x.thrust_short, x.roll_short), max(x.pitch_short, x.yaw_short)),
     )  # fmt: skip
+    motor_gain, flap_gain = _approach(dt_s, s.motor_tau_s), _approach(dt_s, s.flap_tau_s)
     memory = Memory(
         position_integral,
         velocity_integral,
@@ -291,8 +322,13 @@ def cascade(
         rate_smoothed,
         now,
         trim,
-        smoothed(m.flow_left_N, x.thrust_left_N, dt_s, s.motor_tau_s),
-        smoothed(m.flow_right_N, x.thrust_right_N, dt_s, s.motor_tau_s),
+        _spun_up(m.flow_left_N, x.thrust_left_N, motor_gain),
+        _spun_up(m.flow_right_N, x.thrust_right_N, motor_gain),
+        Flaps(
+            m.flaps.left_rad + flap_gain * (x.flap_left_rad - m.flaps.left_rad),
+            m.flaps.right_rad + flap_gain * (x.flap_right_rad - m.flaps.right_rad),
+        ),
+        disturbance,
         x.thrust_short,
         x.roll_short,
         x.pitch_short,

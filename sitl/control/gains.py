@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+from sitl.control.disturbance import Bandwidth
+
 
 class Pid(NamedTuple):
     p: float
@@ -57,6 +59,8 @@ class Settings(NamedTuple):
     velocity_d_tau_s: float  # filter of the velocity loop's derivative
     rate_d_tau_s: float  # filter of the rate loop's derivative
     motor_tau_s: float  # the motors' lag as the controller knows it, for its slipstream estimate
+    flap_tau_s: float  # the same of the flaps, for the disturbance observer
+    disturbance: Bandwidth  # of the observer of what the force laws don't explain
     slipstream_floor_N: float  # total thrust below which the flaps' pressure is not believed to fall
     thrust_floor_N: float  # least total thrust in flight: the flaps live in the slipstream
     thrust_recover_N: float  # the same while the nose is far off its target: thrust is what turns it

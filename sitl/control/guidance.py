@@ -19,6 +19,7 @@ class Guidance(NamedTuple):
 
     follow_position_*: 0.0 lets go of the position on that axis (a velocity target).
     follow_velocity_*: 0.0 lets go of velocity too (a pure acceleration target).
+    aloft: 0.0 while the ground carries part of the weight, which is not a disturbance to be learned.
     """
 
     effort: int
@@ -29,3 +30,4 @@ class Guidance(NamedTuple):
     follow_velocity_north: float = 1.0
     follow_velocity_east: float = 1.0
     follow_velocity_down: float = 1.0
+    aloft: float = 1.0

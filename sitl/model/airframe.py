@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from sitl import strict_yaml
 from sitl.frames import GRAVITY_M_S2
+from sitl.quantities import Entry, check_names, refusal
 from sitl.strict_yaml import ConfigError
 
 
@@ -80,14 +81,6 @@ class Gear(NamedTuple):
     standing_pitch_rad: float
 
 
-class Entry(msgspec.Struct, forbid_unknown_fields=True):
-    """One number of an airframe file."""
-
-    value: float
-    unit: str
-    source: str
-
-
 class GearFile(msgspec.Struct, forbid_unknown_fields=True):
     height_m: Entry
     track_m: Entry
@@ -123,15 +116,10 @@ class LoadedAirframe(NamedTuple):
 def load(path: Path) -> LoadedAirframe:
     """The airframe file at `path`. Raises ConfigError naming what is missing, unknown or out of range."""
     content = strict_yaml.load(path, AirframeFile)
-    wanted, given = set(Airframe._fields), set(content.parameters)
-    for problem, names in (("missing", wanted - given), ("unknown", given - wanted)):
-        if names:
-            raise ConfigError(f"{path}: parameters: {problem}: {', '.join(sorted(names))}")
-    text = path.read_text(encoding="utf-8")
+    check_names(path, "parameters", list(content.parameters), Airframe._fields)
     airframe = Airframe(**{name: content.parameters[name].value for name in Airframe._fields})
     if (mistake := fault(airframe)) is not None:
-        name, message = mistake
-        raise ConfigError(f"{path}:{strict_yaml.line_of(text, f'parameters.{name}')}: parameters.{name}: {message}")
+        raise refusal(path, f"parameters.{mistake[0]}", mistake[1])
     return LoadedAirframe(path.stem, content, airframe, gear(content.gear, airframe))
 
 

@@ -114,7 +114,8 @@ class Commander:
         return self.guidance
 
     def _guidance(self) -> Guidance:
-        return Guidance(int(self._contact.effort), self._guide.trajectory, *self._guide.follow)
+        aloft = 0.0 if self._fix.feet_down > 0 else 1.0
+        return Guidance(int(self._contact.effort), self._guide.trajectory, *self._guide.follow, aloft)
 
     # requests
 

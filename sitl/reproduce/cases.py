@@ -5,6 +5,7 @@ from typing import NamedTuple
 MISSIONS = ("rectangle", "circle")
 OTHER_READINGS = ("rectangle-20x5", "circle-constant-speed")
 NO_FEEDFORWARD = (("FF_VELOCITY", 0.0), ("FF_ACCEL", 0.0), ("FF_INVERSE", 0.0))
+NO_OBSERVER = (("CTL_DIST_F_BW", 0.0), ("CTL_DIST_M_BW", 0.0))
 _STAGE_1 = (("FF_ACCEL", 0.0), ("FF_INVERSE", 0.0))
 _STAGE_2 = (("FF_INVERSE", 0.0),)
 SEEDS = (1, 2, 3, 4, 5)
@@ -47,10 +48,10 @@ class Setup(NamedTuple):
 
 NOISY = "yawsitter-real"
 SETUPS = (
-    Setup("feedback", "printed gains, feedback only", "yawsitter", NO_FEEDFORWARD),
+    Setup("feedback", "printed gains, feedback only", "yawsitter", NO_FEEDFORWARD + NO_OBSERVER),
     Setup("feedforward", "printed gains, feed-forward", "yawsitter"),
-    Setup("exact", "tuned gains, real actuators, state known", "vehicles/yawsitter-real-exact.yaml"),
-    Setup("tuned", "tuned gains, real actuators and noise", NOISY),
+    Setup("exact", "tuned gains, real actuators and gyro, state known", NOISY, (("EST_ENABLE", 0.0),)),
+    Setup("tuned", "tuned gains, real actuators, sensors and filter", NOISY),
 )
 
 
@@ -63,8 +64,8 @@ class View(NamedTuple):
 
 
 VIEWS = (
-    *(View(s.key, f"{s.title} (true position)" if s.vehicle == NOISY else s.title, "true") for s in SETUPS),
-    *(View(s.key, f"{s.title} (as it reports it)", "reported") for s in SETUPS if s.vehicle == NOISY),
+    *(View(s.key, f"{s.title} (true position)" if s.key == "tuned" else s.title, "true") for s in SETUPS),
+    *(View(s.key, f"{s.title} (as it reports it)", "reported") for s in SETUPS if s.key == "tuned"),
 )
 
 
@@ -90,6 +91,7 @@ ABLATIONS = (
     Ablation("unequal slipstreams", "wake-unknown", "the allocation doesn't know them", believed=_NO_WAKE_ARM),
     Ablation("unequal slipstreams", "wake-absent", "neither has them", plant=_NO_WAKE_ARM, believed=_NO_WAKE_ARM),
     Ablation("both", "both-unknown", "the allocation knows neither", believed=_NO_TORQUE + _NO_WAKE_ARM),
+    Ablation("disturbance observer", "no-observer", "off", overrides=NO_OBSERVER),
     Ablation("attitude error", "yxz", "Euler YXZ instead of quaternion", overrides=(("SYS_ATT_ERROR", 0.0),)),
     Ablation("feed-forward", "ff-none", "none", overrides=NO_FEEDFORWARD),
     Ablation("feed-forward", "ff-velocity", "velocity", overrides=_STAGE_1),

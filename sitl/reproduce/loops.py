@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sitl.control.disturbance import Bandwidth
 from sitl.control.gains import Gains, from_names
 from sitl.model.derivative import Actuators
 from sitl.reproduce.linear import READINGS, Design, Hover, Linear, hover, linearised, read_as, taking_part
@@ -20,6 +21,7 @@ from sitl.vehicle import Vehicle, load_vehicle
 
 Array = NDArray[np.float64]
 IDEAL = Actuators(0.0, 0.0)
+OFF = Bandwidth(0.0, 0.0)
 _SETS = (("paper", "yawsitter"), ("tuned", "yawsitter-real"))
 _GRID = 500
 _LOWEST_RAD_S = 0.02
@@ -46,11 +48,11 @@ CASCADES = (
 
 
 def design(vehicle_name: str, actuators: Actuators | None = None, rate_hz: int | None = None) -> Design:
-    """A vehicle's own loop, with its parameters in force and perfect navigation."""
+    """A vehicle's own loop, with its parameters in force, perfect navigation and no disturbance observer."""
     vehicle = Vehicle(load_vehicle(vehicle_name))
     spec = vehicle.spec
     lag = spec.actuators if actuators is None else actuators
-    settings = vehicle.settings()._replace(motor_tau_s=lag.motor_tau_s)
+    settings = vehicle.settings()._replace(motor_tau_s=lag.motor_tau_s, flap_tau_s=lag.flap_tau_s, disturbance=OFF)
     dt_s = 1.0 / (rate_hz or spec.control_rate_hz)
     return Design(spec.airframe.airframe, spec.airframe.gear, lag, from_names(spec.gains), settings, dt_s)
 

@@ -77,10 +77,9 @@ def write(
 ) -> None:
     """report.html, numbers.json, numbers.csv, figures/*.svg and *.png, flights/*.csv.
 
-    Also commands.txt, and the missions and vehicles that its lines name.
+    Also commands.txt, and the missions that its lines name.
     """
-    for name in ("missions", "vehicles"):
-        shutil.copytree(HERE / name, folder / name, dirs_exist_ok=True)
+    shutil.copytree(HERE / "missions", folder / "missions", dirs_exist_ok=True)
     for name in ("figures", "flights"):
         (folder / name).mkdir(parents=True, exist_ok=True)
     (folder / "report.html").write_text(html, encoding="utf-8")

@@ -61,11 +61,13 @@ def test_mean_errors_with_feed_forward_are_at_or_below_print_and_without_above(r
         assert all(mine > theirs for mine, theirs in zip(mae, printed, strict=True))
 
 
-def test_a_known_state_reports_the_true_position_and_a_noisy_one_does_not(report: Report) -> None:
+def test_a_known_state_reports_its_true_error_and_an_estimate_errs_by_more_than_it_knows(
+    report: Report,
+) -> None:
     flights = report.printed["flights"]
-    exact, noisy = flights["exact-rectangle-1"], flights["tuned-rectangle-1"]
+    exact, estimated = flights["exact-rectangle-1"], flights["tuned-rectangle-1"]
     assert exact["reported"]["mae"] == pytest.approx(exact["true"]["mae"], abs=2e-6)
-    assert all(r > t + 3e-4 for r, t in zip(noisy["reported"]["mae"], noisy["true"]["mae"], strict=True))
+    assert all(t > r + 5e-4 for r, t in zip(estimated["reported"]["mae"], estimated["true"]["mae"], strict=True))
 
 
 @pytest.mark.parametrize(

@@ -118,8 +118,7 @@ def test_a_slower_control_rate_still_flies(tmp_path) -> None:
     text = (
         "description: slow\nairframe: yawsitter\ngains: tuned\ncontrol_rate_hz: 100\n"
         "actuators: {motor_tau_s: 0.04, flap_tau_s: 0.03}\n"
-        "sensors: {position_noise_m: 0, velocity_noise_m_s: 0, attitude_noise_rad: 0, rate_noise_rad_s: 0,"
-        " correlation_s: 0}\n"
+        "sensors: perfect\n"
     )
     (tmp_path / "slow.yaml").write_text(text)
     vehicle = hovering(str(tmp_path / "slow.yaml"))

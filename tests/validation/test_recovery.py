@@ -11,7 +11,7 @@ from sitl.control.guidance import Effort, Guidance
 from sitl.control.reference import rest_at
 from sitl.frames import standing
 from sitl.model.rigid_body import State
-from sitl.model.sensors import Sensors
+from sitl.model.sensors import NOISELESS
 from sitl.model.wind import Wind
 from sitl.quaternion import multiply
 from sitl.records import packed
@@ -27,8 +27,8 @@ def excursions(name: str, axis: int, degrees: float, velocity: tuple[float, floa
     spec = load_vehicle(name)
     vehicle = Vehicle(spec)
     a, gear = spec.airframe.airframe, spec.airframe.gear
-    plant = Plant(a, gear, spec.actuators, Sensors(0.0, 0.0, 0.0, 0.0, 0.0), Wind(0.0, 0.0, 0.0, 0.0), spec.substeps)
-    controller = Controller(a, from_names(spec.gains), vehicle.settings())
+    plant = Plant(a, gear, spec.actuators, NOISELESS, Wind(0.0, 0.0, 0.0, 0.0), spec.substeps)
+    controller = Controller(a, from_names(spec.gains), vehicle.settings(), 0.0, vehicle.tuning())
     half = math.radians(degrees) / 2
     turn = [0.0, 0.0, 0.0]
     turn[axis] = math.sin(half)

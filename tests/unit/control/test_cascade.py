@@ -8,6 +8,7 @@ import pytest
 from sitl.control.allocation import allocate
 from sitl.control.attitude import attitude_of, braked, error_quaternion, error_yxz, rates_of
 from sitl.control.feedforward import invert
+from sitl.control.flow import flow_at
 from sitl.control.gains import GAIN_NAMES, Pid, from_names
 from sitl.control.pid import integrated, pid, smoothed
 from sitl.control.position import velocity_command
@@ -102,7 +103,7 @@ def flown_loads(x, u: float = 0.0, w: float = 0.0):
 def test_the_plant_answers_an_allocation_with_the_force_and_moment_that_were_asked(moment) -> None:
     left = right = 5.4
     for _ in range(6):  # the slipstream follows the command
-        x = allocate(A, 10.5, moment, 1.0, 0.5, left, right, 0.0, 2.0)
+        x = allocate(A, 10.5, moment, flow_at(A, 1.0, 0.5, left, right), 0.0, 2.0)
         left, right = x.thrust_left_N, x.thrust_right_N
     force, given = flown_loads(x, 1.0, 0.5)
     assert force[0] == pytest.approx(10.5, abs=0.02)
@@ -110,16 +111,16 @@ def test_the_plant_answers_an_allocation_with_the_force_and_moment_that_were_ask
 
 
 def test_a_moment_beyond_the_actuators_is_cut_and_said() -> None:
-    x = allocate(A, 10.5, (0.0, 5.0, 0.0), 0.0, 0.0, 5.4, 5.4, 0.0, 2.0)
+    x = allocate(A, 10.5, (0.0, 5.0, 0.0), flow_at(A, 0.0, 0.0, 5.4, 5.4), 0.0, 2.0)
     assert max(abs(x.flap_left_rad), abs(x.flap_right_rad)) <= A.flap_max_rad + 1e-12
     assert (x.pitch_short, x.yaw_short) == (1.0, 0.0)
-    y = allocate(A, 10.5, (0.0, 0.0, 9.0), 0.0, 0.0, 5.4, 5.4, 0.0, 2.0)
+    y = allocate(A, 10.5, (0.0, 0.0, 9.0), flow_at(A, 0.0, 0.0, 5.4, 5.4), 0.0, 2.0)
     assert y.yaw_short == 1.0
     assert A.thrust_min_N <= y.thrust_right_N < y.thrust_left_N <= A.thrust_max_N
 
 
 def test_pitch_is_served_before_roll() -> None:
-    x = allocate(A, 10.5, (1.0, 0.2, 0.0), 0.0, 0.0, 5.4, 5.4, 0.0, 2.0)
+    x = allocate(A, 10.5, (1.0, 0.2, 0.0), flow_at(A, 0.0, 0.0, 5.4, 5.4), 0.0, 2.0)
     _, moment = flown_loads(x)
     assert (x.roll_short, x.pitch_short) == (1.0, 0.0)
     assert moment[1] == pytest.approx(0.2, abs=0.01)
@@ -127,7 +128,7 @@ def test_pitch_is_served_before_roll() -> None:
 
 
 def test_roll_keeps_its_share_of_the_flaps_where_pitch_wants_them_all() -> None:
-    x = allocate(A, 10.5, (0.2, 5.0, 0.0), 0.0, 0.0, 5.4, 5.4, 0.0, 2.0)
+    x = allocate(A, 10.5, (0.2, 5.0, 0.0), flow_at(A, 0.0, 0.0, 5.4, 5.4), 0.0, 2.0)
     _, moment = flown_loads(x)
     assert (x.roll_short, x.pitch_short) == (0.0, 1.0)
     assert moment[0] == pytest.approx(0.2, abs=0.01)

@@ -5,14 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from sitl.closed_loop import NOISE_COLUMNS, TRACE_COLUMNS, Controller, LoopState, Plant, run
+from sitl.closed_loop import NOISE_COLUMNS, TRACE_COLUMNS, Controller, Plant, run, start
 from sitl.frames import GRAVITY_M_S2
 from sitl.model.rigid_body import State
-from sitl.model.sensors import PERFECT, Sensors
-from sitl.model.wind import CALM, Wind
+from sitl.model.sensors import NOISELESS
+from sitl.model.wind import Wind
 from sitl.records import packed
 from sitl.reproduce.linear import MEASURED, Design, Linear, deviation, guidance, hover, linearised, moved, read_as
 from sitl.reproduce.loops import CASCADES, IDEAL, axis_margins, design, open_loop, poles, stable, unstable_zero
+from sitl.vehicle import Vehicle, load_vehicle
 
 NORTH, V_NORTH, V_EAST, V_DOWN, PITCH, LEAN, P, Q, R = 0, 3, 4, 5, 7, 8, 9, 10, 11
 
@@ -96,11 +97,11 @@ def test_the_matrices_fly_as_the_vehicle_does(name: str) -> None:
     x[[0, 1, 2, 4, PITCH, LEAN, P]] = 1e-4, -2e-4, 1.5e-4, 3e-4, 1e-4, -1e-4, 2e-4
     steps = 400
     trace = np.zeros((steps + 1, len(TRACE_COLUMNS)))
-    plant = Plant(d.airframe, d.gear, d.actuators, Sensors(0.0, 0.0, 0.0, 0.0, 0.0), Wind(0.0, 0.0, 0.0, 0.0), 1)
-    start = LoopState(moved(at.state, x[:16]), CALM, PERFECT, at.memory)
+    plant = Plant(d.airframe, d.gear, d.actuators, NOISELESS, Wind(0.0, 0.0, 0.0, 0.0), 1)
+    controller = Controller(d.airframe, d.gains, d.settings, 0.0, Vehicle(load_vehicle(name)).tuning())
+    begin = start(controller, moved(at.state, x[:16]))._replace(memory=at.memory)
     noise = np.zeros((0, NOISE_COLUMNS))
-    controllers = packed(Controller(d.airframe, d.gains, d.settings))
-    run(packed(plant), controllers, guidance(), start, noise, 1_000_000, round(d.dt_s * 1e6), steps + 1, trace)
+    run(packed(plant), packed(controller), guidance(), begin, noise, 1_000_000, round(d.dt_s * 1e6), steps + 1, trace)
     for k in range(steps + 1):
         flown = deviation(at.state, State(*trace[k, 1:18].tolist()))
         # ideal actuators are at this step's command already, which the plant's state takes over one step later
