@@ -21,6 +21,8 @@ NAMES = {
     "transfers": "the parameter list, and 500 mission items up and down, over UDP",
     "lateness": "the loop's deadlines beside a bare sleep loop's, and with a listener that never reads",
     "flood": "20,000 messages a second from one address: heartbeats to another, the loop's deadlines; 1 min",
+    "fuzz": "a million hostile datagrams against a hovering vehicle; 4 min, 50,000 with --quick",
+    "soak": "30 simulated hours of missions; 10 min, 3 hours with --quick",
     "shares": "where the time of a simulated second goes",
 }
 
