@@ -23,12 +23,14 @@ bench: $(READY)
 
 setup: $(READY)
 
-# the environment, and the compiled kernels in the user's cache
+# the environment, and the compiled kernels in the user's cache; MAVProxy comes without the 290 MB (VTK, OpenCV) that
+# only its 3D map and video windows need, what else it needs is in the extra `test`
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed, this is " + sys.version)'
 	@echo "Building the environment in $(VENV) ..."
 	@$(PYTHON) -m venv $(VENV)
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test]'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt --no-deps MAVProxy
 	@echo "Compiling the simulator ..."
 	@$(BIN)/python -m sitl.warm
 	@touch $@

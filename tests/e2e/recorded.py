@@ -30,7 +30,7 @@ def _running(folder: Path, *arguments: str) -> Daemon:
         daemon = Daemon(folder, *arguments)
         end_s = time.monotonic() + BOOT_LIMIT_S
         while daemon.process.poll() is None and time.monotonic() < end_s:
-            if " instance " in daemon.log:
+            if "system id" in daemon.log:  # its banner
                 return daemon
             time.sleep(0.05)
         with daemon:  # end it
