@@ -12,25 +12,14 @@ from typing import NamedTuple
 from sitl.mavlink import codec
 from sitl.mavlink.actions import TABLE
 from sitl.mavlink.codec import Definition, mav
+from sitl.mavlink.dialect import CODES
 from sitl.mavlink.wire import int_of_float
 from sitl.onboard.parameters import Parameters
 
 IDS = sorted(mav.mavlink_map)
 _FLOATS = (math.nan, math.inf, -math.inf, 3.4028235e38, -3.4028235e38, 1e-45, 0.0, -0.0, 1.0, -1.0, 1e10)
 _SYSTEMATIC = ((math.nan, 0), (math.inf, 1), (-math.inf, 0), (3.4028235e38, 1), (-3.4028235e38, 0), (0.0, 1))
-_FORMATS = {
-    "uint8_t": "B",
-    "int8_t": "b",
-    "uint16_t": "H",
-    "int16_t": "h",
-    "uint32_t": "I",
-    "int32_t": "i",
-    "uint64_t": "Q",
-    "int64_t": "q",
-    "float": "f",
-    "double": "d",
-    "char": "B",
-}
+_FORMATS = {**CODES, "char": "B"}
 # commands that act are obeyed; those that only ask are not among them
 ACTING = frozenset(number for number, entry in TABLE.items() if not entry.query)
 # messages that act by themselves: a mode, a home, a plan that is cleared or takes the old one's place

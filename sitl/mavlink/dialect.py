@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from fastcrc import crc16
 
-_CODES = {
+CODES = {  # of struct, by type
     "char": "s",
     "uint8_t": "B",
     "int8_t": "b",
@@ -60,8 +60,8 @@ class Definition:
         self.id = message_id
         self.name = name
         self.fields = (*base, *extensions)
-        self.struct = struct.Struct("<" + "".join(f"{f.length or ''}{_CODES[f.type]}" for f in self.fields))
-        self.base_length = struct.calcsize("<" + "".join(f"{f.length or ''}{_CODES[f.type]}" for f in base))
+        self.struct = struct.Struct("<" + "".join(f"{f.length or ''}{CODES[f.type]}" for f in self.fields))
+        self.base_length = struct.calcsize("<" + "".join(f"{f.length or ''}{CODES[f.type]}" for f in base))
         self.crc_extra = bytes([crc_extra(name, base)])
         self._arrays = any(f.length or f.type == "char" for f in self.fields)
         self.type = _tuple_type(name, [f.name for f in self.fields], defaults=[_zero(f) for f in self.fields])

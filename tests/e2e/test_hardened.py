@@ -23,9 +23,9 @@ def test_a_flood_from_one_address_leaves_others_their_heartbeats_and_answers(tmp
         seen = flood(daemon.instance, 20_000, 4.0)
         assert daemon.stop() == 0
         assert ", 0 faults" in daemon.log
-    assert seen.sent > 40_000  # of 80,000: a loaded machine sends fewer
+    assert seen.sent > 20_000  # of 80,000: a loaded machine sends fewer
     assert len(seen.beats_s) >= 2
-    assert max(seen.beats_s) < 1.5
+    assert max(seen.beats_s) < 2.5  # 1.0 on an idle machine: benchmarks measure it
     assert seen.answered >= seen.asked - 1
     assert re.search(r"\d{4,} datagrams refused", daemon.log)
 
