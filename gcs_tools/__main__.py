@@ -147,6 +147,23 @@ def parser() -> argparse.ArgumentParser:
     for name, short in (("save", "write all parameters to a YAML file"), ("load", "write a file's values that differ")):
         add(actions, name, short, f"  gcs param {name} tuned.yaml").add_argument("file", type=Path, metavar="FILE")
 
+    log = commands.add_parser("log", help="list, fetch and erase recorded flights", formatter_class=_Raw)
+    actions = log.add_subparsers(dest="action", required=True, metavar="ACTION", parser_class=_Parser)
+    listing = add(actions, "list", "list the vehicle's logs", "  gcs log list --json")
+    listing.add_argument("--json", action="store_true", help="print one JSON array")
+    get = add(
+        actions, "get", "fetch logs, going on with what was broken off", "  gcs log get\n  gcs log get all --out logs"
+    )
+    get.add_argument(
+        "log",
+        nargs="?",
+        default="latest",
+        metavar="LOG",
+        help="a number, the begin of names, all (the latest flight's)",
+    )
+    get.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="where to (here)")
+    add(actions, "erase", "erase all of the vehicle's logs", "  gcs log erase")
+
     for name, short in (("arm", "arm the motors"), ("disarm", "disarm the motors")):
         force = add(commands, name, short, f"  gcs {name}")
         force.add_argument("--force", action="store_true", help="even if checks or the air stand against it")

@@ -14,15 +14,16 @@ class Blocks:
         self._first = 0  # all blocks before this one are there
 
     def take(self, offset: int, data: bytes) -> bool:
-        """Whether it was a block that had not come yet."""
+        """Whether it was a block that had not come yet. What is beyond the size, of a file that grows, is cut off."""
         number, remainder = divmod(offset - self.start, self.block)
         if remainder or not 0 <= number < len(self._have) or self._have[number]:
             return False
-        if len(data) != min(self.block, self.size - offset):
+        size = min(self.block, self.size - offset)
+        if len(data) < size:
             return False
         self._have[number] = 1
         self.left -= 1
-        self._place(offset, data)
+        self._place(offset, data[:size])
         return True
 
     @property

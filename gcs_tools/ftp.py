@@ -47,15 +47,17 @@ class Ftp:
 
     def __init__(self, client: Client) -> None:
         self._client = client
-        self._sequence = 0
+        self._sequence = round(client.wall_s * 1e3) & 0xFFFF  # not that of another conversation, which may still echo
         self._inbox: deque[Packet] = deque()
+        self._session: int | None = None
 
     def __enter__(self) -> "Ftp":
         self._client.on["FILE_TRANSFER_PROTOCOL"] = self._take
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self._send(self._request(Op.RESET_SESSIONS))
+        if self._session is not None:
+            self._send(self._request(Op.TERMINATE_SESSION, session=self._session))
         del self._client.on["FILE_TRANSFER_PROTOCOL"]
 
     def _take(self, m: Any) -> None:
@@ -89,6 +91,24 @@ class Ftp:
                         return packet
         raise LinkError(f"{what}: the vehicle doesn't answer")
 
+    def _open(self, op: Op, path: str) -> Script[Packet]:
+        """Open a file, in place of whatever else was left open here if there is no room."""
+        for last in (False, True):
+            try:
+                opened = yield from self._ask(path, self._request(op, data=path.encode()))
+            except FtpError as refusal:
+                if last or refusal.error != Error.NO_SESSIONS_AVAILABLE:
+                    raise
+                yield from self._ask(path, self._request(Op.RESET_SESSIONS))
+            else:
+                self._session = opened.session
+                return opened
+        raise AssertionError
+
+    def _close(self, path: str, session: int) -> Script[None]:
+        yield from self._ask(path, self._request(Op.TERMINATE_SESSION, session=session))
+        self._session = None
+
     def entries(self, path: str) -> Script[list[Listed]]:
         """What a folder holds."""
         found: list[Listed] = []
@@ -118,11 +138,11 @@ class Ftp:
 
     def write(self, path: str, data: bytes) -> Script[None]:
         """A file with this content, in place of an old one."""
-        opened = yield from self._ask(path, self._request(Op.CREATE_FILE, data=path.encode()))
+        opened = yield from self._open(Op.CREATE_FILE, path)
         for offset in range(0, len(data), DATA_MAX):
             piece = data[offset : offset + DATA_MAX]
             yield from self._ask(path, self._request(Op.WRITE_FILE, session=opened.session, offset=offset, data=piece))
-        yield from self._ask(path, self._request(Op.TERMINATE_SESSION, session=opened.session))
+        yield from self._close(path, opened.session)
 
     def read(
         self,
@@ -133,12 +153,12 @@ class Ftp:
         seen: Callable[[Blocks], None] = lambda _blocks: None,
     ) -> Script[Blocks]:
         """A file from byte `start` on, its pieces to `place`. `seen` is shown what has come, each time some has."""
-        opened = yield from self._ask(path, self._request(Op.OPEN_FILE_RO, data=path.encode()))
+        opened = yield from self._open(Op.OPEN_FILE_RO, path)
         blocks = Blocks(UINT32.unpack_from(opened.data)[0], DATA_MAX, place, start)
         seen(blocks)
         yield from self._bursts(path, opened.session, blocks, seen)
         yield from self._fill(path, opened.session, blocks, seen)
-        yield from self._ask(path, self._request(Op.TERMINATE_SESSION, session=opened.session))
+        yield from self._close(path, opened.session)
         return blocks
 
     def _bursts(self, path: str, session: int, blocks: Blocks, seen: Callable[[Blocks], None]) -> Script[None]:

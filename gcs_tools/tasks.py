@@ -4,10 +4,11 @@ import argparse
 import json
 import math
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
-from gcs_tools import commands, params
-from gcs_tools.client import Client, Script
+from gcs_tools import commands, logs, params
+from gcs_tools.client import Client, LinkError, Script
 from gcs_tools.link import UdpLink, signer
 from sitl.mavlink.signing import Signer
 
@@ -25,11 +26,19 @@ def _client(args: argparse.Namespace) -> Client:
     return Client(args.system, _signer(args))
 
 
-def _converse(args: argparse.Namespace, talk: Callable[[Client], Script[Any]]) -> Any:
+def _converse(
+    args: argparse.Namespace,
+    talk: Callable[[Client], Script[Any]],
+    each_turn: Callable[[float], None] = lambda _wall_s: None,
+) -> Any:
     client = _client(args)
     with UdpLink(args.connect, args.impair) as link:
         client.start(talk(client))
-        link.run(client)
+        try:
+            link.run(client, each_turn)
+        finally:
+            client.stop(LinkError("interrupted"))
+            link.flush(client)
     return client.result
 
 
@@ -97,6 +106,39 @@ def _param_load(args: argparse.Namespace) -> None:
     print(f"{len(changed)} of {len(wanted)} parameters changed")
 
 
+def _log(args: argparse.Namespace) -> None:
+    _LOG_TASKS[args.action](args)
+
+
+def _log_list(args: argparse.Namespace) -> None:
+    found = _converse(args, _after_connecting(logs.listed))
+    if args.json:
+        print(json.dumps([log._asdict() for log in found]))
+        return
+    for log in found:
+        print(f"{log.number:>3}  {log.size:>12}  {log.label}")
+
+
+def _log_get(args: argparse.Namespace) -> None:
+    from gcs_tools.transfer_bar import TransferBar
+
+    with TransferBar() as bar:
+
+        def script(client: Client) -> Script[list[Path]]:
+            paths = []
+            for log in logs.chosen((yield from logs.listed(client)), args.log):
+                paths.append((yield from logs.fetch(client, log, args.out, bar.show)))
+            return paths
+
+        paths = _converse(args, _after_connecting(script), bar.update)
+    for path in paths:
+        print(path)
+
+
+def _log_erase(args: argparse.Namespace) -> None:
+    print(f"{_converse(args, _after_connecting(logs.erase))} log files erased")
+
+
 def _watch(args: argparse.Namespace) -> None:
     from gcs_tools.watch import Watch, until
 
@@ -118,9 +160,11 @@ _PARAM_TASKS = {
     "save": _param_save,
     "load": _param_load,
 }
+_LOG_TASKS = {"list": _log_list, "get": _log_get, "erase": _log_erase}
 _TASKS: dict[str, Callable[[argparse.Namespace], None]] = {
     "fly": _fly,
     "param": _param,
+    "log": _log,
     "watch": _watch,
     "arm": _say(lambda args, client: commands.arm(client, force=args.force)),
     "disarm": _say(lambda args, client: commands.disarm(client, force=args.force)),

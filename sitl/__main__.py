@@ -10,6 +10,8 @@ from sitl.daemon import config
 
 T = TypeVar("T")
 
+_IN_STATE = Path()  # --record without a folder
+
 VEHICLES = """\
 vehicles:
   yawsitter         the paper's gains, ideal actuators and sensors, 500 Hz (default)
@@ -41,7 +43,8 @@ examples:
   sitl run --listen 0.0.0.0 --gcs 192.168.1.20:14550    a ground station on another machine
   sitl run --set RATE_Y_P=0.4 --set SIM_TLM_RATE=100    parameters, as if written over the link
   sitl run --hil-viewer                            shown by a viewer made for PX4's simulation in hardware
-  sitl run --instance 1 --record logs              a second vehicle, every MAVLink frame kept in logs/*.tlog
+  sitl run --record                                every flight kept as .tlog and .mcap (`gcs log list` shows them)
+  sitl run --instance 1 --record logs              a second vehicle, its flights kept in the folder logs
 
 While it runs, the parameters SIM_SPEED (0: as fast as possible), SIM_PAUSE and SIM_STEP_MS (run so many milliseconds
 while paused) change its pace, and SIM_WIND_N, SIM_WIND_E, SIM_WIND_D and SIM_GUST the air.
@@ -257,7 +260,14 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--forward", action="store_true", help="pass messages on between peers, as MAVLink's routing rules have it"
     )
-    run.add_argument("--record", type=Path, metavar="DIR", help="keep every MAVLink frame in DIR, as a new .tlog")
+    run.add_argument(
+        "--record",
+        type=Path,
+        nargs="?",
+        const=_IN_STATE,
+        metavar="DIR",
+        help="keep each flight in DIR (logs in the state folder): MAVLink frames as .tlog, control steps as .mcap",
+    )
     run.add_argument("--verbose", action="store_true", help="log more")
 
     fly = command("fly", _HELP_FLY, FLY, FLY_EXAMPLES)
@@ -309,7 +319,8 @@ def _run(args: argparse.Namespace) -> int:
         state_dir=args.state_dir,
         zenoh_endpoint=args.zenoh_endpoint,
         zenoh=not args.no_zenoh,
-        record_dir=args.record,
+        record=args.record is not None,
+        record_dir=None if args.record is _IN_STATE else args.record,
         listen=args.listen,
         hil_viewer=args.hil_viewer,
         signing_key=args.signing_key,

@@ -18,7 +18,7 @@ from sitl.estimation.error_state import Estimate, Tuning, copied, nav_of, predic
 from sitl.frames import GRAVITY_M_S2
 from sitl.jit import kernel
 from sitl.model.airframe import Airframe, Gear
-from sitl.model.derivative import ActuatorCommand, Actuators, loads, total
+from sitl.model.derivative import ActuatorCommand, Actuators, Loads, loads, total
 from sitl.model.integrate import step
 from sitl.model.rigid_body import State, accelerations
 from sitl.model.sensors import (
@@ -90,12 +90,39 @@ class Observed(NamedTuple):
     feet_down: int
 
 
+class Traced(NamedTuple):
+    """The vehicle at the begin of one control step, and what the controller made of it."""
+
+    t_s: float
+    state: State
+    command: Command
+    reference: Reference
+    nav: NavState
+    wind_N: Vec3
+    specific_force_B: Vec3  # as in Observed
+    acceleration_N: Vec3
+    acting: Loads
+
+
+_VECTORS = ("wind_N", "specific_force_B", "acceleration_N", *Loads._fields[:-1])
 TRACE_COLUMNS = (
     "t_s",
     *State._fields,
     *(f"command_{name}" for name in Command._fields),
     *(f"reference_{name}" for name in Reference._fields),
+    *(f"nav_{name}" for name in NavState._fields),
+    *(f"{name}_{axis}" for name in _VECTORS for axis in "xyz"),
+    "feet_down",
 )
+
+
+def traced(row: Sequence[float]) -> Traced:
+    """What a row of TRACE_COLUMNS says."""
+    v = [(row[i], row[i + 1], row[i + 2]) for i in range(60, 102, 3)]
+    return Traced(
+        row[0], State(*row[1:18]), Command(*row[18:33]), Reference(*row[33:47]), NavState(*row[47:60]),
+        v[0], v[1], v[2], Loads._make((*v[3:], int(row[102]))),
+    )  # fmt: skip
 
 
 def knowing(s: State) -> Estimate:
@@ -151,6 +178,48 @@ def _navigated(
 
 
 @kernel
+def _motion(plant: Plant, s: State, wind_N: Vec3) -> tuple[Loads, Vec3, Vec3]:
+    """The loads, the specific force in B and the acceleration in N that come of them [m/s²]."""
+    acting = loads(plant.airframe, plant.gear, s, wind_N)
+    force, moment = total(acting)
+    linear, _ = accelerations(plant.airframe, s, force, moment)
+    m = plant.airframe.mass_kg
+    return acting, (force[0] / m, force[1] / m, force[2] / m), linear
+
+
+@kernel
+def _trace(
+    plant: Plant,
+    s: State,
+    command: Command,
+    reference: Reference,
+    nav: NavState,
+    wind_N: Vec3,
+    t_s: float,
+    row: Array,
+) -> None:
+    """Fill one row of TRACE_COLUMNS."""
+    a, specific_force, linear = _motion(plant, s, wind_N)
+    row[0] = t_s
+    for i in range(17):
+        row[1 + i] = s[i]
+    for i in range(15):
+        row[18 + i] = command[i]
+    for i in range(14):
+        row[33 + i] = reference[i]
+    for i in range(13):
+        row[47 + i] = nav[i]
+    vectors = (
+        wind_N, specific_force, linear, a.gravity_force, a.thrust_force, a.thrust_moment, a.side_force, a.wing_force,
+        a.wing_moment, a.flap_force, a.flap_moment, a.drag_force, a.ground_force, a.ground_moment,
+    )  # fmt: skip
+    for i in range(14):
+        for j in range(3):
+            row[60 + 3 * i + j] = vectors[i][j]
+    row[102] = a.feet_down
+
+
+@kernel
 def run(
     plants: Sequence[Plant],
     controllers: Sequence[Controller],
@@ -173,7 +242,7 @@ def run(
     s, gusts, errors, memory = loop.state, loop.gusts, loop.sensors, loop.memory
     estimating, noisy = controller.estimating > 0.0, noise.shape[0] > 0
     estimate = copied(loop.estimate)
-    quiet, mass = np.zeros(NOISES), plant.airframe.mass_kg
+    quiet = np.zeros(NOISES)
     dt_s = dt_us * 1e-6
     h_s = dt_s / plant.substeps
     wind_N = wind_velocity(plant.wind, gusts, -s.down_m)
@@ -203,20 +272,13 @@ def run(
             command.thrust_left_N, command.thrust_right_N, command.flap_left_rad, command.flap_right_rad
         )
         if trace.shape[0] > 0:
-            trace[k, 0] = t_s
-            for i in range(17):
-                trace[k, 1 + i] = s[i]
-            for i in range(15):
-                trace[k, 18 + i] = command[i]
-            for i in range(14):
-                trace[k, 33 + i] = reference[i]
+            _trace(plant, s, command, reference, nav, wind_N, t_s, trace[k])
         for _ in range(plant.substeps):
             s = step(plant.airframe, plant.gear, plant.actuators, s, actuators, wind_N, h_s)
         if estimating or noisy:
             felt = (0.0, 0.0, 0.0)
             if estimating:
-                force, _ = total(loads(plant.airframe, plant.gear, s, wind_N))
-                felt = (force[0] / mass, force[1] / mass, force[2] / mass)
+                _, felt, _ = _motion(plant, s, wind_N)
             n = noise[k, 3:] if noisy else quiet
             errors = step_sensors(plant.sensors, errors, (s.p_rad_s, s.q_rad_s, s.r_rad_s), felt, n, dt_s)
             if estimating:
@@ -225,15 +287,13 @@ def run(
                 estimate = _navigated(estimate, controller.tuning, plant.sensors, errors, s, n, off, now_us, dt_us)
     if guidance.effort <= _IDLE and steps > 0:
         memory = at_rest(controller.airframe, controller.airframe.thrust_min_N)
-    acting = loads(plant.airframe, plant.gear, s, wind_N)
-    force, moment = total(acting)
-    linear, _ = accelerations(plant.airframe, s, force, moment)
+    acting, specific_force, linear = _motion(plant, s, wind_N)
     observed = Observed(
         nav_of(estimate) if estimating else observe(plant.sensors, errors, s),
         command,
         reference,
         wind_N,
-        (force[0] / mass, force[1] / mass, force[2] / mass),
+        specific_force,
         linear,
         acting.feet_down,
     )

@@ -6,7 +6,7 @@ give the same bits. Nothing in here reads a clock, a socket or the environment.
 
 import math
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -29,6 +29,7 @@ from sitl.loop_arrays import (
 )
 from sitl.model.airframe import Airframe
 from sitl.model.airframe import description as airframe_description
+from sitl.model.derivative import Load, by_cause
 from sitl.model.derivative import loads as plant_loads
 from sitl.model.rigid_body import State
 from sitl.model.sensors import NOISES, PERFECT, TURN_ON, magnetometer, step_sensors, switched_on
@@ -55,13 +56,6 @@ _NO_NOISE = np.zeros((0, NOISE_COLUMNS))
 
 # a three-cell 2200 mAh pack, linear between full and empty; propulsion as a whole is half efficient
 _FULL_V, _EMPTY_V, _CAPACITY_MAH, _EFFICIENCY, _IDLE_W = 12.6, 10.5, 2200.0, 0.5, 3.0
-
-
-class Load(NamedTuple):
-    """One cause's force [N] and moment about the CM [N·m], in B."""
-
-    force_B: Vec3
-    moment_B: Vec3
 
 
 class Vehicle:
@@ -297,17 +291,7 @@ class Vehicle:
     def loads(self) -> dict[str, Load]:
         """Forces and moments on the vehicle now, by cause."""
         wind_N = observed_of(self._observed_array).wind_N
-        x = plant_loads(self.spec.airframe.airframe, self._gear, state_of(self._loop_array), wind_N)
-        zero = (0.0, 0.0, 0.0)
-        return {
-            "gravity": Load(x.gravity_force, zero),
-            "thrust": Load(x.thrust_force, x.thrust_moment),
-            "side_force": Load(x.side_force, zero),
-            "aero": Load(x.wing_force, x.wing_moment),
-            "flaps": Load(x.flap_force, x.flap_moment),
-            "drag": Load(x.drag_force, zero),
-            "ground": Load(x.ground_force, x.ground_moment),
-        }
+        return by_cause(plant_loads(self.spec.airframe.airframe, self._gear, state_of(self._loop_array), wind_N))
 
     def description(self) -> dict[str, Any]:
         """What this vehicle is, as plain data: airframe with units and sources, gains, actuators, sensors."""

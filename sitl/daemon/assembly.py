@@ -6,6 +6,7 @@ from collections.abc import Callable
 from sitl.daemon.boot import Boot
 from sitl.daemon.config import Port, RunConfig, SettingError
 from sitl.daemon.files import FolderArea
+from sitl.daemon.flight_recorder import FlightRecorder
 from sitl.daemon.loop import Loop
 from sitl.daemon.recorder import Recorder
 from sitl.daemon.udp import Sockets
@@ -41,7 +42,7 @@ def build_vehicle(config: RunConfig) -> Vehicle:
         raise SettingError(str(error)) from None
 
 
-def build_endpoint(config: RunConfig, vehicle: Vehicle, signer: Signer | None) -> Endpoint:
+def build_endpoint(config: RunConfig, vehicle: Vehicle, recorder: Recorder | None, signer: Signer | None) -> Endpoint:
     assert config.state_dir is not None
     peers = [(PortKind(port.value), each) for port, addresses in config.static_peers.items() for each in addresses]
     return Endpoint(
@@ -49,7 +50,7 @@ def build_endpoint(config: RunConfig, vehicle: Vehicle, signer: Signer | None) -
         identity=Identity(config.identity),
         system_id=config.system_id,
         static_peers=peers,
-        logs=FolderArea(config.state_dir / "logs"),
+        logs=FolderArea(config.log_dir, in_use=recorder.writes if recorder else lambda _name: False),
         scratch=FolderArea(config.state_dir / "scratch"),
         limits=DAEMON,
         signer=signer,
@@ -81,12 +82,14 @@ def build_loop(
     signer: Signer | None = None,
 ) -> tuple[Loop, Endpoint]:
     """The loop with everything attached, and each function in it run once so that none compiles in flight."""
-    endpoint = build_endpoint(config, vehicle, signer)
-    loop = Loop(vehicle, endpoint, sockets, clock, publisher=publisher, recorder=recorder)
+    endpoint = build_endpoint(config, vehicle, recorder, signer)
+    loop = Loop(vehicle, endpoint, sockets, clock, publisher=publisher)
     feed = Feed(vehicle, config.instance, loop.figures)
     for topic in keys.TOPICS:
         if topic.queryable:
             feed.latest(topic)
+    if recorder is not None:
+        loop.record_with(FlightRecorder(vehicle, feed, recorder))
     if publisher is not None:
         loop.feed_from(feed)
         publisher.attach(feed)
@@ -124,5 +127,5 @@ def banner(config: RunConfig, vehicle: Vehicle, publisher: Publisher | None, rec
         *(["  forwarding       between all peers"] if config.forward else []),
     ]
     if recorder is not None:
-        lines.append(f"  recording        {recorder.path}")
+        lines.append(f"  recording        each flight, in {recorder.folder}")
     return "\n".join(lines)

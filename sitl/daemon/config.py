@@ -57,7 +57,8 @@ class RunConfig(NamedTuple):
     state_dir: Path | None = None  # None: default_state_dir
     zenoh_endpoint: str | None = None  # None: the instance's own loopback port
     zenoh: bool = True
-    record_dir: Path | None = None
+    record: bool = False
+    record_dir: Path | None = None  # None: in the state folder
     listen: str = LOOPBACK
     hil_viewer: bool = False
     signing_key: Path | None = None  # the file
@@ -66,6 +67,12 @@ class RunConfig(NamedTuple):
     @property
     def system_id(self) -> int:
         return self.instance + 1
+
+    @property
+    def log_dir(self) -> Path:
+        """Where recorded flights are, to be written and to be read over the link."""
+        assert self.state_dir is not None
+        return self.record_dir or self.state_dir / "logs"
 
     @property
     def local_ports(self) -> dict[Port, Address]:

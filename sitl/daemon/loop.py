@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 
 from sitl.daemon.clock import SLICE_US, Lateness, Pacing
 from sitl.daemon.config import Port
-from sitl.daemon.recorder import Recorder
 from sitl.daemon.udp import Sockets
 from sitl.mavlink.peers import PortKind
 from sitl.onboard.modes import EventKind, Severity
 from sitl.telemetry.messages import LoopMessage
 
 if TYPE_CHECKING:
+    from sitl.daemon.flight_recorder import FlightRecorder
     from sitl.mavlink.endpoint import Endpoint
     from sitl.telemetry.feed import Feed
     from sitl.telemetry.publisher import Publisher
@@ -60,7 +60,6 @@ class Loop:
         clock: Callable[[], float],
         *,
         publisher: "Publisher | None" = None,
-        recorder: Recorder | None = None,
     ) -> None:
         self.faults = 0
         self.turns = 0
@@ -69,7 +68,7 @@ class Loop:
         self._endpoint = endpoint
         self._sockets = sockets
         self._publisher = publisher
-        self._recorder = recorder
+        self._recorder: FlightRecorder | None = None
         self._feed: Feed | None = None
         self._clock = clock
         self._start_s = clock()
@@ -84,6 +83,10 @@ class Loop:
     def feed_from(self, feed: "Feed") -> None:
         """The feed that is to see the MAVLink frames too."""
         self._feed = feed
+
+    def record_with(self, recorder: "FlightRecorder") -> None:
+        """The recorder that is to see flights and MAVLink frames."""
+        self._recorder = recorder
 
     def run(self, stopping: Callable[[], bool]) -> Ending:
         """Turn until `stopping()` or until the link asks for an end."""
@@ -168,8 +171,14 @@ class Loop:
             self._generation = p.generation
 
     def _advance(self, until_us: int, wall_s: float) -> None:
+        recorder = self._recorder
         try:
-            self._vehicle.advance(until_us)
+            if recorder is None:
+                self._vehicle.advance(until_us)
+            else:
+                trace = recorder.trace(until_us, wall_s)
+                self._vehicle.advance(until_us, trace)
+                recorder.take(trace)
         except Exception as error:
             self._complain("the simulation failed and is paused", wall_s)
             self._vehicle.events.tell(Severity.CRITICAL, f"Simulation failed and is paused: {type(error).__name__}")
@@ -198,11 +207,7 @@ class Loop:
         if self._feed is not None:
             self._feed.frame(frame, outgoing)
         if self._recorder is not None:
-            try:
-                self._recorder.frame(frame, self._clock())
-            except OSError as error:
-                log.error("recording stopped: %s: %s", self._recorder.path, error.strerror)
-                self._recorder = None
+            self._recorder.frame(frame, self._clock())
 
     def _log_events(self) -> None:
         events = self._vehicle.events

@@ -121,8 +121,8 @@ def main(config: RunConfig, verbose: bool = False) -> int:
     construction = Construction(config)
     try:
         lock = _locked(config.state_dir)
-        if config.record_dir is not None:
-            recorder = Recorder(config.record_dir, config.instance, clock())
+        if config.record:
+            recorder = Recorder(config.log_dir, config.instance)
         construction.start()
         while construction.is_alive() and not stop():
             boot.turn(clock())

@@ -15,6 +15,7 @@ from sitl.mavlink.ftp import FtpService
 from sitl.mavlink.identity import COMPONENT_ID, SIMULATOR, Identity, version
 from sitl.mavlink.limits import UNLIMITED, Allowance, Limits, cost
 from sitl.mavlink.link import Datagram, Link
+from sitl.mavlink.logs import LogService
 from sitl.mavlink.mission import MissionService
 from sitl.mavlink.offboard import OffboardService
 from sitl.mavlink.parameters import ParameterService
@@ -66,12 +67,14 @@ class Endpoint:
         self._missions = MissionService(link, {mav.MAV_MISSION_TYPE_MISSION: vehicle.mission})
         self._offboard = OffboardService(link)
         self._commands = CommandService(link)
+        logs = logs or MemoryArea()
         mounts = {
             metadata.FOLDER: Mount(link.metadata.area, False),
-            "logs": Mount(logs or MemoryArea(), False),
+            "logs": Mount(logs, False),
             "scratch": Mount(scratch or MemoryArea(), True),
         }
         self._ftp = FtpService(link, Files(mounts))
+        self._logs = LogService(link, logs)
         self._handlers = self._table()
         self._event_number = vehicle.events.next_number
         self._heartbeat_due_s = float("-inf")
@@ -107,6 +110,10 @@ class Endpoint:
             "PARAM_EXT_REQUEST_READ": p.on_extended,
             "PARAM_EXT_SET": p.on_extended_set,
             "FILE_TRANSFER_PROTOCOL": self._ftp.on_request,
+            "LOG_REQUEST_LIST": self._logs.on_list,
+            "LOG_REQUEST_DATA": self._logs.on_data,
+            "LOG_REQUEST_END": self._logs.on_end,
+            "LOG_ERASE": self._logs.on_erase,
             "MISSION_COUNT": m.on_count,
             "MISSION_ITEM_INT": m.on_item_int,
             "MISSION_ITEM": m.on_item,
@@ -285,7 +292,8 @@ class Endpoint:
         self._missions.advance()
         self._parameters.advance()
         self._ftp.advance()
-        services = (self._missions, self._parameters, self._ftp)
+        self._logs.advance()
+        services = (self._missions, self._parameters, self._ftp, self._logs)
         self._deadline_s = min(self._heartbeat_due_s, deadline_s, *(service.deadline_s for service in services))
 
     def _beat(self) -> None:

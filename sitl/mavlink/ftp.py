@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from sitl.mavlink.codec import Frame, by_name
 from sitl.mavlink.files import Entry, Files, OpenFile
 from sitl.mavlink.ftp_payload import DATA_MAX, HEAD, UINT32, Error, Op, Packet, crc32
-from sitl.mavlink.pace import Pace
+from sitl.mavlink.limits import Allowance
 
 if TYPE_CHECKING:
     from sitl.mavlink.link import Link
@@ -35,7 +35,7 @@ CLIENTS_MAX = 32
 IDLE_S = 10.0  # wall time; PX4's
 REPEATED_S = 5.0  # wall time in which the same request is a repetition
 BURST_PACKETS = 147  # 35 kB, as PX4: what a client's socket holds while the client is busy
-RATE_B_S = 4e6  # of all bursts together: a quarter of each of the loop's turns
+RATE_HZ = 17_000.0  # packets a second of wall time, of all bursts together: a quarter of the loop's turns goes there
 CHECKSUM_BYTES = 1 << 18  # of a file, at one poll: a large log must not hold the vehicle up
 
 _MESSAGE = by_name("FILE_TRANSFER_PROTOCOL")
@@ -112,7 +112,7 @@ class FtpService:
         self._link = link
         self._files = files
         self._clients: dict[tuple[Peer, int, int], _Client] = {}
-        self._pace = Pace(RATE_B_S, BURST_PACKETS * DATA_MAX)
+        self._allowance = Allowance(RATE_HZ, BURST_PACKETS)
 
     # --- in
 
@@ -286,17 +286,17 @@ class FtpService:
                 self._clients.pop(key).close()
             elif client.checksum is not None:
                 self._go_on(client, client.checksum)
-        bursts = [(c, n, s) for c in self._clients.values() for n, s in c.sessions.items() if s.burst is not None]
-        allowance = self._pace.refill(wall_s)
-        for client, number, session in bursts:
-            share = allowance / len(bursts)
-            while share >= DATA_MAX and session.burst is not None:
-                self._send_next(client, number, session, session.burst)
-                share -= DATA_MAX
-                self._pace.allowance -= DATA_MAX
+        bursts = [(c, n, s) for c in self._clients.values() for n, s in c.sessions.items()]
+        while bursts := [(c, n, s) for c, n, s in bursts if s.burst is not None]:
+            for client, number, session in bursts:
+                if not self._allowance.take(wall_s):
+                    return
+                self._send_next(client, number, session)
 
-    def _send_next(self, client: _Client, number: int, session: _Session, burst: Packet) -> None:
+    def _send_next(self, client: _Client, number: int, session: _Session) -> None:
         """The next packet of a burst."""
+        burst = session.burst
+        assert burst is not None
         client.heard_s = self._link.wall_s
         try:
             data = session.file.read(burst.offset, burst.size or DATA_MAX)

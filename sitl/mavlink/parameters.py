@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from sitl.mavlink.codec import Frame, by_name, mav, message
 from sitl.mavlink.ftp_payload import crc32
-from sitl.mavlink.pace import Pace
+from sitl.mavlink.limits import Allowance
 from sitl.onboard.modes import Event
 from sitl.onboard.parameters import ParameterRefusal
 
@@ -48,11 +48,11 @@ _ERRORS = {
 class Listing:
     """Where one peer's list stands."""
 
-    __slots__ = ("next", "pace")
+    __slots__ = ("allowance", "next")
 
     def __init__(self) -> None:
         self.next: int | None = None
-        self.pace = Pace(LIST_RATE_HZ, LIST_BURST)
+        self.allowance = Allowance(LIST_RATE_HZ, LIST_BURST)
 
     def start(self) -> None:
         """From the top, or from the first value if it was under way."""
@@ -142,12 +142,11 @@ class ParameterService:
         listing, names = peer.listing, self._parameters.names
         if listing.next is None or peer not in self._link.peers:
             return False
-        for _ in range(int(listing.pace.refill(self._link.wall_s))):
+        while listing.allowance.take(self._link.wall_s):
             if listing.next == _HASH_PLACE:
                 self._send_hash(peer)
             else:
                 self._send_value(peer, names[listing.next])
-            listing.pace.allowance -= 1.0
             listing.next += 1
             if listing.next >= len(names):
                 listing.next = None

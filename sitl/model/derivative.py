@@ -43,6 +43,27 @@ class Loads(NamedTuple):
     feet_down: int
 
 
+class Load(NamedTuple):
+    """One cause's force [N] and moment about the CM [N·m], in B."""
+
+    force_B: Vec3
+    moment_B: Vec3
+
+
+def by_cause(x: Loads) -> dict[str, Load]:
+    """The loads one by one, under the names that people see."""
+    zero = (0.0, 0.0, 0.0)
+    return {
+        "gravity": Load(x.gravity_force, zero),
+        "thrust": Load(x.thrust_force, x.thrust_moment),
+        "side_force": Load(x.side_force, zero),
+        "aero": Load(x.wing_force, x.wing_moment),
+        "flaps": Load(x.flap_force, x.flap_moment),
+        "drag": Load(x.drag_force, zero),
+        "ground": Load(x.ground_force, x.ground_moment),
+    }
+
+
 @kernel
 def airspeed(s: State, wind_N: Vec3) -> Vec3:
     """(u, v, w) [m/s]: the CM's velocity relative to the air, in B."""

@@ -16,6 +16,11 @@ from sitl.onboard.modes import Event
 from sitl.telemetry.keys import TOPICS
 
 if TYPE_CHECKING:
+    from sitl.control.cascade import Command
+    from sitl.control.reference import Reference
+    from sitl.geodesy import GeoPoint
+    from sitl.model.rigid_body import State
+    from sitl.navigation import NavState
     from sitl.onboard.parameters import Parameters
     from sitl.snapshot import Snapshot
 
@@ -26,6 +31,31 @@ Quadruple = tuple[float, float, float, float]
 _RPM = 60.0 / (2.0 * math.pi)
 
 encode = msgspec.json.Encoder().encode
+
+
+class Instant(Protocol):
+    """What the sampled messages need of a moment; a Snapshot has it."""
+
+    @property
+    def now_us(self) -> int: ...
+    @property
+    def origin(self) -> "GeoPoint": ...
+    @property
+    def truth(self) -> "State": ...
+    @property
+    def nav(self) -> "NavState": ...
+    @property
+    def acceleration_B(self) -> Triple: ...
+    @property
+    def acceleration_N(self) -> Triple: ...
+    @property
+    def wind_N(self) -> Triple: ...
+    @property
+    def reference(self) -> "Reference": ...
+    @property
+    def command(self) -> "Command": ...
+    @property
+    def feet_down(self) -> int: ...
 
 
 class LoadLike(Protocol):
@@ -191,7 +221,7 @@ def _yxz_deg(w: float, x: float, y: float, z: float) -> Triple:
     return math.degrees(phi), math.degrees(theta), math.degrees(psi)
 
 
-def state(s: "Snapshot") -> StateMessage:
+def state(s: Instant) -> StateMessage:
     t, n = s.truth, s.nav
     lat_deg, lon_deg = to_global(s.origin, t.north_m, t.east_m)
     return StateMessage(
@@ -210,7 +240,7 @@ def state(s: "Snapshot") -> StateMessage:
     )
 
 
-def attitude(s: "Snapshot") -> AttitudeMessage:
+def attitude(s: Instant) -> AttitudeMessage:
     t, n = s.truth, s.nav
     phi_deg, theta_deg, psi_deg = _yxz_deg(t.qw, t.qx, t.qy, t.qz)
     return AttitudeMessage(
@@ -226,7 +256,7 @@ def attitude(s: "Snapshot") -> AttitudeMessage:
     )
 
 
-def setpoint(s: "Snapshot") -> SetpointMessage:
+def setpoint(s: Instant) -> SetpointMessage:
     r, c = s.reference, s.command
     phi_deg, theta_deg, psi_deg = _yxz_deg(c.qw, c.qx, c.qy, c.qz)
     return SetpointMessage(
@@ -246,7 +276,7 @@ def setpoint(s: "Snapshot") -> SetpointMessage:
     )
 
 
-def actuators(s: "Snapshot") -> ActuatorsMessage:
+def actuators(s: Instant) -> ActuatorsMessage:
     t, c = s.truth, s.command
     return ActuatorsMessage(
         now_us=s.now_us,
@@ -332,9 +362,10 @@ def events(next_number: int, log: Iterable[Event]) -> EventsMessage:
     return EventsMessage(next_number, [event(e) for e in log])
 
 
-def parameters(now_us: int, p: "Parameters") -> ParametersMessage:
+def parameters(now_us: int, p: "Parameters", names: Iterable[str] | None = None) -> ParametersMessage:
+    """Those of `names`, or all."""
     entries = []
-    for name in p.names:
+    for name in p.names if names is None else names:
         d = p.declaration(name)
         entries.append(
             ParameterMessage(

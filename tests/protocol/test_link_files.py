@@ -375,3 +375,10 @@ def test_what_the_vehicle_does_not_have_is_not_described(world: World) -> None:
     assert [t["type"] for t in general["metadataTypes"]] == [1]
     assert station.ask(mav.MAV_CMD_REQUEST_MESSAGE, 395) != [mav.MAV_RESULT_ACCEPTED]  # COMPONENT_INFORMATION
     assert station.all("COMPONENT_INFORMATION") == []
+
+
+def test_the_tools_make_room_where_sessions_were_left_open(world: World, asker: Asker) -> None:
+    asker.station.encoder.system, asker.station.encoder.component = 252, 190
+    for _ in range(SESSIONS_MAX):
+        asker.accepted(Op.OPEN_FILE_RO, b"/logs/flight.tlog")
+    assert world.converse(asker.station, fetch("/logs/flight.tlog"), 5.0) == LOG

@@ -267,23 +267,26 @@ def test_the_figures_count_what_happened(bench) -> None:
     assert figures.up_wall_s == pytest.approx(3.0, abs=0.01)
 
 
-def test_frames_reach_the_recorder_with_the_time_and_a_full_disk_only_ends_the_recording(bench, caplog) -> None:
-    class Disk:
-        path = "x.tlog"
-        left = 1
-
+def test_the_recorder_sees_frames_with_their_time_and_room_is_asked_for_before_each_advance(bench) -> None:
+    class Tape:
         def __init__(self) -> None:
-            self.frames: list = []
+            self.seen: list = []
 
         def frame(self, frame, unix_s) -> None:
-            if not self.left:
-                raise OSError(28, "No space left on device")
-            self.left -= 1
-            self.frames.append((frame, unix_s))
+            self.seen.append((frame, unix_s))
 
-    disk = Disk()
-    Loop(bench.craft, bench.link, bench.wire, bench.clock, recorder=disk)
-    for _ in range(3):
-        bench.link.on_frame(b"\xfdabc", True)
-    assert disk.frames == [(b"\xfdabc", 1000.0)]
-    assert caplog.text.count("No space left") == 1
+        def trace(self, until_us, unix_s):
+            self.seen.append("trace")
+            return "rows"
+
+        def take(self, trace) -> None:
+            assert trace == "rows"
+            self.seen.append(bench.craft.now_us)
+
+    tape = Tape()
+    bench.craft.advance = lambda until_us, trace: Craft.advance(bench.craft, until_us)
+    bench.loop.record_with(tape)
+    bench.link.on_frame(b"\xfdabc", True)
+    bench.run(0.005)
+    assert tape.seen[0] == (b"\xfdabc", 1000.0)
+    assert tape.seen[1:3] == ["trace", 4000]
