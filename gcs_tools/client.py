@@ -21,6 +21,7 @@ LAST_VEHICLE = 250
 COMPONENT_ID = mav.MAV_COMP_ID_MISSIONPLANNER
 HEARTBEAT_S = 1.0
 LOST_S = 3.0  # of silence, after which the vehicle counts as lost
+_DEFAULT = _UNAVAILABLE = 0  # intervals with a meaning of their own: asked for, and told
 RETRY_S = 0.7  # without an answer, after which a request is sent again
 TRIES = 10
 SEEN_S = 8.0  # until a change shows in the heartbeats, of which some may be lost
@@ -277,27 +278,30 @@ class Client:
     def set_intervals(self, intervals_us: dict[str, int]) -> Script[None]:
         """Set the streams' intervals, all in one go, and see every one answered (in whatever way).
 
-        An acknowledgement doesn't tell which interval it is for. So where one is missing, the vehicle is asked for the
-        intervals in force as well, and only those that are not yet as wanted are set again.
+        An acknowledgement doesn't tell which interval it is for, and may come twice. So the vehicle is asked for the
+        intervals in force as well, and only those that are not yet as wanted are set again; acknowledgements alone
+        count where it tells none.
         """
         open_us, numbers = dict(intervals_us), {codec.by_name(name).id: name for name in intervals_us}
+        tells = False
 
         def told(m: Any) -> None:
-            name = numbers.get(m.message_id, "")
-            if open_us.get(name) == m.interval_us:
+            nonlocal tells
+            tells, name = True, numbers.get(m.message_id, "")
+            if name in open_us and (m.interval_us in (open_us[name], _UNAVAILABLE) or open_us[name] == _DEFAULT):
                 del open_us[name]
 
         self.on["MESSAGE_INTERVAL"] = told
         try:
-            for attempt in range(TRIES):
+            for _ in range(TRIES):
                 self.interval_acks.clear()
                 self.send_intervals(open_us)
-                for name in open_us if attempt else ():
+                for name in open_us:
                     self.request("MESSAGE_INTERVAL", float(codec.by_name(name).id))
                 end_s = self.wall_s + RETRY_S
-                while len(self.interval_acks) < len(open_us) and self.wall_s < end_s:
+                while open_us and self.wall_s < end_s:
                     yield end_s
-                if len(self.interval_acks) >= len(open_us):
+                if not open_us or (not tells and len(self.interval_acks) >= len(open_us)):
                     return
         finally:
             del self.on["MESSAGE_INTERVAL"]

@@ -171,6 +171,9 @@ class StandIn:
             self.set(mode="mission")
         elif m.command == mav.MAV_CMD_REQUEST_MESSAGE and int(m.param1) == codec.by_name("HOME_POSITION").id:
             self.send("HOME_POSITION", latitude=556985000, longitude=373595000, altitude=190000)
+        elif m.command == mav.MAV_CMD_REQUEST_MESSAGE and int(m.param1) == codec.by_name("MESSAGE_INTERVAL").id:
+            interval = self.intervals.get(codec.by_id(int(m.param2)).name, -1)
+            self.send("MESSAGE_INTERVAL", message_id=int(m.param2), interval_us=interval)
 
     def _on_mission_count(self, m: Any, back: dict[str, int]) -> None:
         self.expected, self._incoming, self._back = m.count, [], back
