@@ -16,9 +16,10 @@ from sitl.control.guidance import Effort, Guidance
 from sitl.control.reference import DEGREE, Trajectory
 from sitl.loop_arrays import LOOP_SIZE, OBSERVED_SIZE, put_loop, run_in_place, state_of
 from sitl.model.rigid_body import State
-from sitl.onboard.mission import MissionItem, MissionState
+from sitl.onboard.mission import MissionState
 from sitl.onboard.modes import Mode
 from sitl.onboard.offboard import OffboardTarget
+from sitl.onboard.plan import MissionItem
 from sitl.vehicle import Vehicle, load_vehicle
 
 STREAM_US = 20_000  # between targets, and between two crossings into compiled code
@@ -127,7 +128,7 @@ def fly_targets(vehicle: Vehicle) -> float:
         now_us = vehicle.now_us
         position, velocity, acceleration = plan.reference.at((now_us - start_us) * 1e-6)
         offboard.submit(OffboardTarget(now_us, position, velocity, acceleration, 0.0), now_us)
-        if commander.mode is not Mode.OFFBOARD and offboard.streaming(now_us):
+        if commander.mode is not Mode.OFFBOARD and not offboard.lost(now_us):
             commander.set_mode(Mode.OFFBOARD)
             commander.arm()
         vehicle.advance(now_us + STREAM_US)

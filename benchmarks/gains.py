@@ -84,7 +84,7 @@ def _steps_until_it_acts() -> int:
     """1 for the very next control step after the PARAM_SET was taken in."""
     one, other = _hovering(), _hovering()
     for craft in (one, other):
-        craft.vehicle.commander.reposition(STEP_M, 0.0, -HEIGHT_M)
+        craft.vehicle.commander.guided.reposition((STEP_M, 0.0, -HEIGHT_M))
         craft.vehicle.advance(craft.vehicle.now_us + 507 * craft.vehicle.step_us)  # between two ticks, in mid-move
     if one.vehicle.snapshot().truth != other.vehicle.snapshot().truth:
         raise BenchmarkError("two flights alike are not the same")
@@ -118,7 +118,7 @@ def _stream(craft: Craft, north_m: float, seconds: float) -> NDArray[np.float64]
     rows = []
     for _ in range(round(seconds * 1e6) // TURN_US):
         vehicle.offboard.submit(OffboardTarget(None, position_N=(north_m, 0.0, -HEIGHT_M)), vehicle.now_us)
-        if vehicle.commander.mode is not Mode.OFFBOARD and vehicle.offboard.streaming(vehicle.now_us):
+        if vehicle.commander.mode is not Mode.OFFBOARD and not vehicle.offboard.lost(vehicle.now_us):
             vehicle.commander.set_mode(Mode.OFFBOARD)
         rows.append(craft.trace(TURN_US // vehicle.step_us))
     return np.concatenate(rows)

@@ -23,7 +23,7 @@ from sitl.mavlink.codec import mav
 STREAM_S = 0.02  # of the vehicle's time between targets
 LISTEN_S = 2.0  # for the first sample of every stream
 LEAD_S = 0.5  # armed and standing, before the flight's time starts
-WARM_UP_S = 1.3  # of streaming before Offboard is asked for (the vehicle wants a second of it)
+WARM_UP_S = 1.3  # of streaming before Offboard is asked for (more than any vehicle wants of it)
 ARMING_PATIENCE_S = 8.0
 START_WITHIN_M = 1.0  # of the flight's first point
 GROUND_M = 0.1  # a reference lower than this at its end is a landing

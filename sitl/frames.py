@@ -89,6 +89,12 @@ def wire_rates(p: float, q: float, r: float) -> Vec3:
 
 
 @kernel
+def body_rates(rollspeed: float, pitchspeed: float, yawspeed: float) -> Vec3:
+    """The wire's rates as body rates p, q, r."""
+    return -yawspeed, pitchspeed, rollspeed
+
+
+@kernel
 def heading(qw: float, qx: float, qy: float, qz: float) -> float:
     """Where the belly faces [rad, from north toward east]: MAVLink's yaw in hover."""
     w, x, y, z = multiply((qw, qx, qy, qz), BODY_TO_WIRE)

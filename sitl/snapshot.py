@@ -7,6 +7,8 @@ from sitl.control.reference import Reference
 from sitl.geodesy import GeoPoint
 from sitl.model.rigid_body import State
 from sitl.navigation import NavState
+from sitl.onboard.geofence import Breach
+from sitl.onboard.guided import Orbiting
 from sitl.onboard.mission import MissionState
 from sitl.onboard.modes import Landed, Mode
 
@@ -43,5 +45,10 @@ class Snapshot(NamedTuple):
     mission_state: MissionState
     mission_current: int
     mission_total: int
-    plan_id: int
+    plan_id: int  # of the mission
     battery: Battery
+    fence_id: int = 0
+    rally_id: int = 0
+    breach: Breach = Breach()
+    fenced: bool = False  # there is a fence to keep to
+    orbiting: Orbiting | None = None

@@ -37,9 +37,9 @@ from sitl.model.wind import Wind
 from sitl.onboard.commander import Commander
 from sitl.onboard.declarations import declarations
 from sitl.onboard.events import EventLog
-from sitl.onboard.mission import Mission
 from sitl.onboard.offboard import Offboard
 from sitl.onboard.parameters import ParameterRefusal, Parameters
+from sitl.onboard.plans import Plans
 from sitl.onboard.store import MemoryStore, Store
 from sitl.quaternion import Vec3, rotate_back
 from sitl.records import packed
@@ -95,9 +95,11 @@ class Vehicle:
         wind = {"SIM_WIND_N": wind_N[0], "SIM_WIND_E": wind_N[1], "SIM_WIND_D": wind_N[2], "SIM_GUST": gust_m_s}
         for name, value in {**wind, **(overrides or {})}.items():
             self._override(name, value)
-        self.mission = Mission(store, self.events)
-        self.offboard = Offboard(self.parameters)
-        self.commander = Commander(self.parameters, self.mission, self.offboard, self.events, home, heading_rad)
+        self.plans = Plans(self.parameters, store, self.events, home)
+        self.mission = self.plans.mission
+        full_N, hover_N = 2.0 * self._believed.thrust_max_N, self._believed.mass_kg * GRAVITY_M_S2
+        self.offboard = Offboard(self.parameters, self.plans.geofence.objection, full_N, hover_N)
+        self.commander = Commander(self.parameters, self.plans, self.offboard, self.events, heading_rad)
         self._gear = spec.airframe.gear
         self.reset()
 
@@ -245,12 +247,20 @@ class Vehicle:
         cubes = abs(s.rotor_left_rad_s) ** 3 + abs(s.rotor_right_rad_s) ** 3
         self._power_W = _IDLE_W + a.torque_coefficient * cubes / _EFFICIENCY
         self._energy_J += self._power_W * TICK_US * 1e-6
+        self.commander.watch_battery(self._remaining)
+
+    @property
+    def _used_mAh(self) -> float:
+        return self._energy_J / (0.5 * (_FULL_V + _EMPTY_V)) / 3.6
+
+    @property
+    def _remaining(self) -> float:
+        return max(0.0, 1.0 - self._used_mAh / _CAPACITY_MAH)
 
     def _battery(self) -> Battery:
-        used_mAh = self._energy_J / (0.5 * (_FULL_V + _EMPTY_V)) / 3.6
-        remaining = max(0.0, 1.0 - used_mAh / _CAPACITY_MAH)
+        remaining = self._remaining
         voltage = _EMPTY_V + (_FULL_V - _EMPTY_V) * remaining
-        return Battery(voltage, self._power_W / voltage, remaining, used_mAh)
+        return Battery(voltage, self._power_W / voltage, remaining, self._used_mAh)
 
     def snapshot(self) -> Snapshot:
         """The vehicle now; built afresh only when time has moved or something has happened."""
@@ -284,6 +294,11 @@ class Vehicle:
             mission_current=m.current,
             mission_total=len(m.items),
             plan_id=m.plan_id,
+            fence_id=self.plans.fence.plan_id,
+            rally_id=self.plans.rally.plan_id,
+            breach=c.geofence.breach,
+            fenced=c.geofence.present,
+            orbiting=c.guided.orbiting,
             battery=self._battery(),
         )
         return self._snapshot

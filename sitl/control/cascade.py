@@ -250,7 +250,10 @@ def cascade(
     now = _reference_trim(a, ref, m.reference_trim, True)
     rates_ff = (0.0, 0.0, 0.0)
     moment_ff = (0.0, 0.0, 0.0)
-    if s.feedforward_inverse > 0.0:
+    steering = guidance.steering
+    if steering.steered > 0.0:
+        rates_ff = (steering.p_rad_s, steering.q_rad_s, steering.r_rad_s)
+    elif s.feedforward_inverse > 0.0:
         before = _reference_trim(a, _carried(ref, -_LOOK_S), now, False)
         after = _reference_trim(a, _carried(ref, _LOOK_S), now, False)
         pitch_rate = (after.pitch_rad - before.pitch_rad) / (2.0 * _LOOK_S)
@@ -278,6 +281,12 @@ def cascade(
         True,
     )
     target = attitude_of(ref.heading_rad, trim.pitch_rad, trim.lean_rad)
+    along_nose_N = rotate_back(q_NB, force_N)[0]
+
+    # an attitude or body rates in place of the trajectory
+    if steering.steered > 0.0:
+        target = (steering.qw, steering.qx, steering.qy, steering.qz) if steering.steered < 2.0 else q_NB
+        along_nose_N = steering.thrust_N
 
     # attitude
     error, nose = error_quaternion(q_NB, target)
@@ -292,6 +301,8 @@ def cascade(
     held = (roll_held, pitch_held, yaw_held)
     attitude_integral = _integrated(m.attitude_integral, error, dt_s, _ANGLE_INTEGRAL_MAX, held)
     rate_target = rate_command(gains.attitude, error, attitude_integral, rates, rates_ff)
+    if steering.steered > 1.0:
+        rate_target = rates_ff
 
     # rate
     rate_error = _difference(rate_target, rates)
@@ -300,11 +311,10 @@ def cascade(
     demand = moment(gains.rate, rate_error, rate_integral, rate_error_rate, moment_ff)
 
     # allocation
-    force_x = rotate_back(q_NB, force_N)[0]
     # thrust makes the flaps work: more of it while the nose is further than 45° off its target
     off = max(0.0, min(1.0, 1.0 - nose / _NEAR_COSINE))
     floor_N = s.thrust_floor_N + off * max(0.0, s.thrust_recover_N - s.thrust_floor_N)
-    x = allocate(a, force_x, demand, flow, 0.5 * s.slipstream_floor_N, floor_N)
+    x = allocate(a, along_nose_N, demand, flow, 0.5 * s.slipstream_floor_N, floor_N)
     command = Command(
         target[0], target[1], target[2], target[3],
         rate_target[0], rate_target[1], rate_target[2],

@@ -14,8 +14,29 @@ class Effort(IntEnum):
     FLY = 2  # the whole cascade follows the trajectory
 
 
+class Steering(NamedTuple):
+    """What is flown in place of the trajectory.
+
+    steered: 0.0 nothing, the trajectory is flown; 1.0 the attitude q_NB, turning at the given rates, and the thrust;
+    2.0 the body rates [rad/s, B] and the thrust. thrust_N: the force along body x, of propellers and wing together.
+    """
+
+    steered: float
+    qw: float
+    qx: float
+    qy: float
+    qz: float
+    p_rad_s: float
+    q_rad_s: float
+    r_rad_s: float
+    thrust_N: float
+
+
+STRAIGHT = Steering(0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
 class Guidance(NamedTuple):
-    """Effort, trajectory, and which of its derivatives bind on each axis.
+    """Effort, trajectory, which of its derivatives bind on each axis, and what is flown in its place.
 
     follow_position_*: 0.0 lets go of the position on that axis (a velocity target).
     follow_velocity_*: 0.0 lets go of velocity too (a pure acceleration target).
@@ -31,3 +52,4 @@ class Guidance(NamedTuple):
     follow_velocity_east: float = 1.0
     follow_velocity_down: float = 1.0
     aloft: float = 1.0
+    steering: Steering = STRAIGHT

@@ -162,6 +162,7 @@ ADDITIONS = {
             _fields("uint8_t target_system, uint8_t target_component, uint8_t type"),
             _fields("uint8_t mission_type, uint32_t opaque_id"),
         ),
+        Definition(80, "COMMAND_CANCEL", _fields("uint16_t command, uint8_t target_system, uint8_t target_component")),
         Definition(
             111,
             "TIMESYNC",

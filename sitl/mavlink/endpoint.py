@@ -25,6 +25,8 @@ from sitl.mavlink.routing import Router, target_places
 from sitl.mavlink.signing import Signer, is_signed
 from sitl.mavlink.streams import BY_ID, NEVER, STREAMS
 from sitl.onboard.modes import Event, EventKind, Severity
+from sitl.onboard.plan import Plan
+from sitl.onboard.plans import Plans
 
 if TYPE_CHECKING:
     from sitl.vehicle import Vehicle
@@ -64,7 +66,7 @@ class Endpoint:
         link = self._link = Link(vehicle, identity, system_id, static_peers, limits, signer)
         self._vehicle = vehicle
         self._parameters = ParameterService(link)
-        self._missions = MissionService(link, {mav.MAV_MISSION_TYPE_MISSION: vehicle.mission})
+        self._missions = MissionService(link, _stores(vehicle.plans))
         self._offboard = OffboardService(link)
         self._commands = CommandService(link)
         logs = logs or MemoryArea()
@@ -100,6 +102,7 @@ class Endpoint:
             "TIMESYNC": self._on_timesync,
             "COMMAND_LONG": c.on_long,
             "COMMAND_INT": c.on_int,
+            "COMMAND_CANCEL": c.on_cancel,
             "SET_MODE": c.on_set_mode,
             "SETUP_SIGNING": self._on_setup_signing,
             "REQUEST_DATA_STREAM": lambda peer, frame: on_request_data_stream(self._link, peer, frame),
@@ -290,10 +293,11 @@ class Endpoint:
             self._beat()
         deadline_s = self._watch_ground_stations(now_s)
         self._missions.advance()
+        self._commands.advance()
         self._parameters.advance()
         self._ftp.advance()
         self._logs.advance()
-        services = (self._missions, self._parameters, self._ftp, self._logs)
+        services = (self._missions, self._parameters, self._commands, self._ftp, self._logs)
         self._deadline_s = min(self._heartbeat_due_s, deadline_s, *(service.deadline_s for service in services))
 
     def _beat(self) -> None:
@@ -352,7 +356,8 @@ class Endpoint:
         EventKind.PARAMETER: _tell_parameter,
         EventKind.ITEM_REACHED: _tell_reached,
         EventKind.ITEM_CURRENT: lambda self, _event: self._tell_stream("MISSION_CURRENT"),
-        EventKind.MISSION: lambda self, _event: self._tell_stream("MISSION_CURRENT"),
+        EventKind.PLAN: lambda self, _event: self._tell_stream("MISSION_CURRENT"),
+        EventKind.FENCE: lambda self, _event: self._tell_stream("FENCE_STATUS"),
         EventKind.MODE: lambda self, _event: self._tell_stream("CURRENT_MODE"),
         EventKind.LANDED: lambda self, _event: self._tell_stream("EXTENDED_SYS_STATE"),
         EventKind.HOME: lambda self, _event: self._tell_stream("HOME_POSITION"),
@@ -386,3 +391,11 @@ class Endpoint:
     def peers(self) -> tuple[Peer, ...]:
         """Who is being served."""
         return tuple(self._link.peers)
+
+
+def _stores(plans: Plans) -> dict[int, Plan]:
+    return {
+        mav.MAV_MISSION_TYPE_MISSION: plans.mission,
+        mav.MAV_MISSION_TYPE_FENCE: plans.fence,
+        mav.MAV_MISSION_TYPE_RALLY: plans.rally,
+    }

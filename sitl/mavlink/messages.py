@@ -42,6 +42,7 @@ _CONTROL = (
     | mav.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
 )
 _BATTERY = mav.MAV_SYS_STATUS_SENSOR_BATTERY
+_FENCE = mav.MAV_SYS_STATUS_GEOFENCE
 _PREARM = mav.MAV_SYS_STATUS_PREARM_CHECK
 
 _ESTIMATOR = 1 | 2 | 4 | 8 | 16 | 32 | 64 | 256 | 512  # ESTIMATOR_STATUS_FLAGS: all that is good, nothing that is wrong
@@ -58,7 +59,9 @@ def sys_status(v: View) -> Values:
         healthy |= _BATTERY
     if s.ready_to_arm or s.armed:
         healthy |= _PREARM
-    present = _SENSORS | _CONTROL | _BATTERY | _PREARM
+    if not s.breach.outside:
+        healthy |= _FENCE
+    present = _SENSORS | _CONTROL | _BATTERY | _PREARM | (_FENCE if s.fenced else 0)
     enabled = present if s.armed else present & ~_CONTROL
     voltage, current = uint16(s.battery.voltage_V * 1e3), int16(s.battery.current_A * 100.0)
     percent = clamped(s.battery.remaining * 100.0, 0, 100)
@@ -239,11 +242,27 @@ def extended_sys_state(v: View) -> Values:
 
 
 def mission_current(v: View) -> Values:
-    """`total` is 65535 where no mission is stored; fence and rally ids are 0, there being none."""
+    """`total` is 65535 where no mission is stored."""
     s = v.s
     total = s.mission_total or _UNKNOWN_U16
     in_mission = 1 if s.mode is Mode.MISSION else 2
-    return s.mission_current, total, int(s.mission_state), in_mission, s.plan_id, 0, 0
+    return s.mission_current, total, int(s.mission_state), in_mission, s.plan_id, s.fence_id, s.rally_id
+
+
+def fence_status(v: View) -> Values:
+    b = v.s.breach
+    return b.since_us // 1000 & 0xFFFFFFFF, b.times & 0xFFFF, int(b.outside), int(b.kind), mav.FENCE_MITIGATE_NONE
+
+
+def orbit_execution_status(v: View) -> Values | None:
+    """Only while orbiting. The radius is positive clockwise."""
+    orbiting = v.s.orbiting
+    if orbiting is None:
+        return None
+    north, east, down = orbiting.circle.centre_N
+    lat, lon = to_global(v.s.origin, north, east)
+    radius = orbiting.circle.radius_m if orbiting.clockwise else -orbiting.circle.radius_m
+    return v.s.now_us, radius, degE7(lat), degE7(lon), v.s.origin.alt_amsl_m - down, mav.MAV_FRAME_GLOBAL_INT
 
 
 def current_mode(v: View) -> Values:

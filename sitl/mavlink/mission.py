@@ -24,8 +24,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from sitl.mavlink.codec import Frame, mav, message
-from sitl.onboard.mission import CAPACITY, Fault, MissionItem
 from sitl.onboard.modes import Severity
+from sitl.onboard.plan import CAPACITY, Fault, MissionItem
 
 if TYPE_CHECKING:
     from sitl.mavlink.link import Link
@@ -46,6 +46,7 @@ _FAULTS = {
     "param6": mav.MAV_MISSION_INVALID_PARAM6_Y,
     "param7": mav.MAV_MISSION_INVALID_PARAM7,
     "total": mav.MAV_MISSION_ERROR,
+    "place": mav.MAV_MISSION_INVALID,
 }
 _LOCAL_FRAME, _MISSION_FRAME = mav.MAV_FRAME_LOCAL_NED, mav.MAV_FRAME_MISSION
 
@@ -105,9 +106,7 @@ class MissionService:
             self._ack(partner, kind, mav.MAV_MISSION_DENIED)
             self._link.complain(peer, "Upload denied: another one is under way")
         elif kind not in self._stores:
-            known = kind in (mav.MAV_MISSION_TYPE_FENCE, mav.MAV_MISSION_TYPE_RALLY)
-            empty = known and m.count == 0
-            self._ack(partner, kind, mav.MAV_MISSION_ACCEPTED if empty else mav.MAV_MISSION_UNSUPPORTED)
+            self._ack(partner, kind, mav.MAV_MISSION_UNSUPPORTED)
         elif m.count > CAPACITY:
             self._ack(partner, kind, mav.MAV_MISSION_NO_SPACE)
             self._link.complain(peer, f"Upload refused: {m.count} items, there is room for {CAPACITY}")
@@ -243,11 +242,9 @@ class MissionService:
         self._ack(partner, kind, max(results, default=mav.MAV_MISSION_ACCEPTED))
 
     def _clear(self, kind: int) -> int:
-        accepted = kind in (mav.MAV_MISSION_TYPE_FENCE, mav.MAV_MISSION_TYPE_RALLY)  # nothing there to clear
-        result: int = mav.MAV_MISSION_ACCEPTED if accepted else mav.MAV_MISSION_UNSUPPORTED
-        if kind in self._stores:
-            result = _FAULTS["total"] if self._stores[kind].replace(()) else mav.MAV_MISSION_ACCEPTED
-        return result
+        if kind not in self._stores:
+            return int(mav.MAV_MISSION_UNSUPPORTED)
+        return int(_FAULTS["total"] if self._stores[kind].replace(()) else mav.MAV_MISSION_ACCEPTED)
 
     def on_partial_list(self, peer: "Peer", frame: Frame) -> None:
         self._ack(_partner(peer, frame), frame.message.mission_type, mav.MAV_MISSION_UNSUPPORTED)

@@ -1,4 +1,4 @@
-"""Position, velocity and acceleration targets from the wire to the vehicle's own frame, and the sticks.
+"""Targets from the wire to the vehicle's own frame (positions and their derivatives, attitudes), and the sticks.
 
 Frames of SET_POSITION_TARGET_LOCAL_NED: 1 LOCAL_NED; 7 LOCAL_OFFSET_NED, position from where the vehicle is;
 8 BODY_NED, position as in 1, velocity and acceleration along and across the heading; 9 BODY_OFFSET_NED and
@@ -14,11 +14,12 @@ and longitude, one alone can't be ignored: both are.
 import math
 from typing import TYPE_CHECKING, Any
 
+from sitl.frames import body_quaternion, body_rates
 from sitl.geodesy import to_local
 from sitl.mavlink.codec import Frame, mav
 from sitl.mavlink.wire import INT16_UNSET, INT32_UNSET, NAN, boot_time_us
 from sitl.onboard.modes import Outcome
-from sitl.onboard.offboard import OffboardTarget
+from sitl.onboard.offboard import AttitudeTarget, OffboardTarget
 from sitl.quaternion import Vec3
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from sitl.mavlink.peers import Peer
 
 FORCE_SET, YAW_IGNORE, YAW_RATE_IGNORE = 0x200, 0x400, 0x800
+THRUST_BODY_SET, THROTTLE_IGNORE, ATTITUDE_IGNORE = 0x20, 0x40, 0x80
 
 _OFFSET_FRAMES = (mav.MAV_FRAME_LOCAL_OFFSET_NED, mav.MAV_FRAME_BODY_OFFSET_NED, mav.MAV_FRAME_BODY_FRD)
 _BODY_FRAMES = (mav.MAV_FRAME_BODY_NED, mav.MAV_FRAME_BODY_OFFSET_NED, mav.MAV_FRAME_BODY_FRD)
@@ -107,7 +109,23 @@ class OffboardService:
         self._link.vehicle.commander.manual(x, y, z, r)
 
     def on_attitude_target(self, peer: "Peer", frame: Frame) -> None:
-        self._link.complain(peer, "Attitude targets are not supported")
+        """Attitude and thrust, or body rates and thrust, in the multicopter frame; NaN and the mask both ignore."""
+        m = frame.message
+        mask = m.type_mask
+        roll, pitch, yaw = _masked(m.body_roll_rate, m.body_pitch_rate, m.body_yaw_rate, mask)
+        attitude = None if mask & ATTITUDE_IGNORE or any(map(math.isnan, m.q)) else body_quaternion(*m.q)
+        if attitude is None and any(map(math.isnan, (roll, pitch, yaw))):
+            self._link.complain(peer, "Attitude target refused: without attitude it takes all three body rates")
+        elif mask & THROTTLE_IGNORE or math.isnan(m.thrust):
+            self._link.complain(peer, "Attitude target refused: it takes a thrust")
+        elif mask & THRUST_BODY_SET:
+            self._link.complain(peer, "Attitude target refused: thrust is along the nose only")
+        else:
+            roll, pitch, yaw = (0.0 if math.isnan(rate) else rate for rate in (roll, pitch, yaw))
+            target = AttitudeTarget(attitude, body_rates(roll, pitch, yaw), m.thrust)
+            outcome = self._link.vehicle.offboard.submit_attitude(target, self._link.vehicle.now_us)
+            if not outcome.ok:
+                self._link.complain(peer, outcome.reason)
 
 
 def _masked(x: float, y: float, z: float, mask: int) -> Vec3:

@@ -33,19 +33,20 @@ class Stream(NamedTuple):
     """One message that can flow. Rates in Hz of simulation time, left out = only when asked for."""
 
     definition: Definition
-    values: Callable[[View], messages.Values]
+    values: Callable[[View], messages.Values | None]
     rates_Hz: Mapping[PortKind, float]
 
     def payload(self, view: View) -> bytes:
-        """Empty where the values fit no field: what a simulation that has run away has to offer."""
+        """Empty where there is nothing to tell, or values fit no field: as of a simulation that has run away."""
         try:
-            return self.definition.pack(*self.values(view))
+            values = self.values(view)
+            return b"" if values is None else self.definition.pack(*values)
         except (struct.error, OverflowError, ValueError):
             return b""
 
 
 def _stream(
-    name: str, gcs_Hz: float, onboard_Hz: float, values: Callable[[View], messages.Values] | None = None
+    name: str, gcs_Hz: float, onboard_Hz: float, values: Callable[[View], messages.Values | None] | None = None
 ) -> Stream:
     rates_Hz = {PortKind.GCS: gcs_Hz, PortKind.ONBOARD: onboard_Hz}
     return Stream(by_name(name), values or getattr(messages, name.lower()), rates_Hz)
@@ -82,6 +83,8 @@ STREAMS = (
     _stream("ESTIMATOR_STATUS", 0.5, 1),
     _stream("VIBRATION", 0.1, 0.5),
     _stream("MISSION_CURRENT", 1, 1),
+    _stream("FENCE_STATUS", 1, 1),
+    _stream("ORBIT_EXECUTION_STATUS", 2, 5),
     _stream("CURRENT_MODE", 0.5, 0.5),
     _stream("SYSTEM_TIME", 1, 1),
     _stream("UTM_GLOBAL_POSITION", 0, 0),

@@ -15,6 +15,7 @@ class Condition(NamedTuple):
     moving: bool
     terminated: bool
     coming_down: bool = False  # in a mode that ends in a landing
+    outside: str = ""  # what of the fence it violates
 
 
 _CHECKS = (
@@ -30,6 +31,8 @@ def check(condition: Condition) -> Outcome:
     for field, sentence in _CHECKS:
         if getattr(condition, field):
             return Outcome(Verdict.TEMPORARILY_REJECTED, sentence)
+    if condition.outside:
+        return Outcome(Verdict.TEMPORARILY_REJECTED, f"the vehicle is outside the fence: {condition.outside}")
     if not condition.standing:
         return Outcome(Verdict.TEMPORARILY_REJECTED, "the vehicle does not stand on its feet")
     return ACCEPTED

@@ -1,33 +1,43 @@
 """The commander: arming, modes and what happens when something goes missing.
 
-Which modes can be entered and which follow stands in two tables, ENTRY and AFTER (transitions).
+Which modes can be entered and which follow stands in two tables, ENTRY and AFTER (transitions). What is flown in each
+mode is the matter of its own class; the commander puts it in force and ends it.
 """
 
 import math
 from collections.abc import Callable
 
-from sitl.control.guidance import Effort, Guidance
+from sitl.control.guidance import Guidance
 from sitl.control.reference import rest_at
 from sitl.geodesy import GeoPoint
 from sitl.navigation import NavState
 from sitl.onboard import arming, ground
+from sitl.onboard.battery import BatteryWatch, Level
 from sitl.onboard.events import EventLog
 from sitl.onboard.executor import Executor, Progress
+from sitl.onboard.feasibility import Feasibility
 from sitl.onboard.following import Following
+from sitl.onboard.footing import Footing
+from sitl.onboard.gaze import Gaze, Look
 from sitl.onboard.guide import Fix, Guide
+from sitl.onboard.guided import Guided
 from sitl.onboard.homing import Homing, Stage
 from sitl.onboard.landing import Landing
-from sitl.onboard.mission import LEAST_HEIGHT_M, Mission, MissionState
+from sitl.onboard.mission import MissionState
 from sitl.onboard.modes import ACCEPTED, EventKind, Landed, Mode, Outcome, Severity, Verdict
 from sitl.onboard.offboard import Offboard
 from sitl.onboard.parameters import Parameters
-from sitl.onboard.places import Places
+from sitl.onboard.plans import Plans
 from sitl.onboard.sticks import Sticks
 from sitl.onboard.takeoff import Takeoff
 from sitl.onboard.transitions import AFTER, ENTRY, LOSSES, Happening, after
 from sitl.quaternion import Vec3
 
 __all__ = ["AFTER", "ENTRY", "Commander", "Happening"]
+
+_TERMINATE, _KEEP_GAZE = 4.0, {(Mode.TAKEOFF, Mode.HOLD)}
+_ASKED_WRONGLY = (Mode.OFFBOARD, Mode.ORBIT)  # a refusal is the request's fault, not the moment's
+_FACING = (Mode.TAKEOFF, Mode.HOLD, Mode.ORBIT, Mode.MISSION)  # modes in which the gaze counts
 
 
 class Commander:
@@ -36,29 +46,32 @@ class Commander:
     def __init__(
         self,
         parameters: Parameters,
-        mission: Mission,
+        plans: Plans,
         offboard: Offboard,
         events: EventLog,
-        origin: GeoPoint,
         heading_rad: float,
     ) -> None:
+        mission, places = plans.mission, plans.places
         self._p, self._mission, self._offboard, self._events = parameters, mission, offboard, events
+        self._places, self.geofence = places, plans.geofence
         self.mode = Mode.HOLD
         self.armed = False
         self.failsafe = ""
         self.changed = True
         self.home_heading_rad = heading_rad
-        self._places = Places(origin)
-        self._guide = Guide(parameters, heading_rad)
-        self._landing = Landing(parameters, self._guide)
-        self._takeoff = Takeoff(parameters, self._guide, self._places)
-        self._following = Following(offboard, self._guide)
-        self._homing = Homing(parameters, self._guide, self._landing, self._places)
+        guide = self._guide = Guide(parameters, heading_rad)
+        self.gaze = Gaze()
+        self._landing = Landing(parameters, guide)
+        self._takeoff = Takeoff(parameters, guide, places, self.geofence)
+        self._following = Following(offboard, guide)
+        self._homing = Homing(parameters, guide, self._landing, plans)
         self._sticks = Sticks(parameters)
-        self._executor = Executor(mission, parameters, events, self._guide, self._places, self.set_home)
+        self._executor = Executor(mission, parameters, events, guide, places, self.gaze, self.set_home)
+        self.guided = Guided(guide, self.geofence, self.gaze, self._switch, lambda: self.armed and not self.standing)
+        self._feasibility = Feasibility(plans)
+        self._battery = BatteryWatch(parameters)
+        self._footing = Footing(guide, events)
         self._terminated = False
-        self._contact = ground.Contact(Effort.OFF, Landed.ON_GROUND)
-        self._tilt = ground.Tilt()
         self._fix = Fix.at_rest(0, heading_rad)
         self._stations_lost = False
         self.guidance = self._guidance()
@@ -80,42 +93,48 @@ class Commander:
     @property
     def standing(self) -> bool:
         """On the ground with motors idling or off."""
-        return self._contact.standing
+        return self._footing.standing
 
     @property
     def landed(self) -> Landed:
-        return self._contact.landed
+        return self._footing.landed
 
     @property
     def tipped_over(self) -> bool:
-        return self._tilt.tipped_over
-
-    @tipped_over.setter
-    def tipped_over(self, lies: bool) -> None:
-        self._tilt = ground.Tilt(lies)
+        return self._footing.tipped_over
 
     # the present
 
     def observe(self, now_us: int, nav: NavState, feet_down: int) -> None:
         """The vehicle as it is now; requests are judged by it."""
         self._fix = Fix(now_us, nav, feet_down)
+        self.guided.observe(self._fix)
 
     def tick(self, now_us: int, nav: NavState, feet_down: int) -> Guidance:
         """Decide for the next control steps."""
         self.observe(now_us, nav, feet_down)
         self.changed = False
         self._watch_tilt()
+        self._watch_plans()
         if self.armed:
             self._MODES[self.mode](self)
+            self._face()
             self._watch_ground()
-        elif self.landed is not Landed.ON_GROUND and (feet_down > 0 or self.tipped_over):
-            self._now_in(self._contact._replace(landed=Landed.ON_GROUND))
+            self._watch_fence()
+        else:
+            self._footing.rest(feet_down)
         self.guidance = self._guidance()
         return self.guidance
 
     def _guidance(self) -> Guidance:
-        aloft = 0.0 if self._fix.feet_down > 0 else 1.0
-        return Guidance(int(self._contact.effort), self._guide.trajectory, *self._guide.follow, aloft)
+        guide, aloft = self._guide, 0.0 if self._fix.feet_down > 0 else 1.0
+        return Guidance(int(self._footing.effort), guide.trajectory, *guide.follow, aloft, guide.steering)
+
+    def _face(self) -> None:
+        if self.mode in _FACING and not self.standing:
+            bearing = self.gaze.bearing(self._guide.reference(self._fix))
+            if bearing is not None or self._guide.faced:
+                self._guide.face(self._fix, bearing)
 
     # requests
 
@@ -126,7 +145,9 @@ class Commander:
         fix = self._fix
         on_feet, moving = fix.feet_down > 0, fix.speed_m_s > arming.MOVING_M_S
         landing = self.mode in (Mode.LAND, Mode.RETURN)
-        return arming.check(arming.Condition(self.tipped_over, on_feet, moving, self._terminated, landing))
+        violation = self.geofence.violation(fix.position_N)
+        outside = violation.reason if violation else ""
+        return arming.check(arming.Condition(self.tipped_over, on_feet, moving, self._terminated, landing, outside))
 
     def arm(self, force: bool = False) -> Outcome:
         if self.armed:
@@ -136,7 +157,7 @@ class Commander:
             self._tell(Severity.CRITICAL, f"arming refused: {ready.reason}")
             return ready
         self.armed, self.failsafe, self.changed = True, "", True
-        self._now_in(ground.Contact(Effort.IDLE if self._fix.feet_down > 0 else Effort.FLY, self.landed))
+        self._footing.run(self._fix.feet_down)
         self._guide.rest_here(self._fix)
         self._events.add(EventKind.ARMED, Severity.INFO, "armed", 1)
         self._begin(self.mode)
@@ -157,8 +178,9 @@ class Commander:
             reason = _CONDITIONS[condition](self)
             if reason:
                 self._tell(Severity.WARNING, f"{mode.value} refused: {reason}")
-                return Outcome(Verdict.DENIED if mode is Mode.OFFBOARD else Verdict.TEMPORARILY_REJECTED, reason)
-        self._switch(mode)
+                return Outcome(Verdict.DENIED if mode in _ASKED_WRONGLY else Verdict.TEMPORARILY_REJECTED, reason)
+        if mode is not Mode.ORBIT:  # which is flown already
+            self._switch(mode)
         return ACCEPTED
 
     def takeoff(self, altitude_amsl_m: float | None = None, heading_rad: float | None = None) -> Outcome:
@@ -186,28 +208,6 @@ class Commander:
             return outcome
         return self.set_mode(Mode.MISSION)
 
-    def reposition(
-        self,
-        north_m: float | None,
-        east_m: float | None,
-        down_m: float | None,
-        heading_rad: float | None = None,
-        speed_m_s: float | None = None,
-    ) -> Outcome:
-        """Fly to a point and hold there. None or NaN keeps that coordinate, as far as a smooth stop allows."""
-        if not self.armed or self.standing:
-            return Outcome(Verdict.TEMPORARILY_REJECTED, "reposition refused: not flying")
-        values = [None if v is None or math.isnan(v) else v for v in (north_m, east_m, down_m, heading_rad, speed_m_s)]
-        if any(v is not None and abs(v) > 1e5 for v in values[:3]):  # also if infinite
-            return Outcome(Verdict.DENIED, "reposition refused: further than 100 km")
-        if values[2] is not None and values[2] > -LEAST_HEIGHT_M:
-            return Outcome(Verdict.DENIED, f"reposition refused: lower than {LEAST_HEIGHT_M:g} m above the ground")
-        self._switch(Mode.HOLD)
-        if any(v is not None for v in values[:4]):
-            north, east, down, heading, speed = values
-            self._guide.reach(self._fix, (north, east, down), heading, speed)
-        return ACCEPTED
-
     def change_speed(self, speed_m_s: float) -> Outcome:
         """Cruise speed until the mode is left."""
         if not (math.isfinite(speed_m_s) and 0.0 < speed_m_s <= self._p["MPC_XY_VEL_MAX"]):
@@ -216,9 +216,18 @@ class Commander:
         self._guide.speed_m_s = speed_m_s
         return ACCEPTED
 
+    def face(self, point_N: Vec3) -> Outcome:
+        """Turn toward a place, and keep facing it until the mode changes."""
+        if self.mode not in _FACING:
+            return Outcome(Verdict.TEMPORARILY_REJECTED, f"there is nothing to face in {self.mode.value}")
+        self.gaze.at(Look.POINT, point_N)
+        return ACCEPTED
+
     def set_home(self, point: GeoPoint | None, heading_rad: float | None = None) -> Outcome:
         """Home at a point, or where the vehicle is (None)."""
-        outcome = self._places.move_home(self._places.global_of(self._fix.position_N) if point is None else point)
+        point = self._places.global_of(self._fix.position_N) if point is None else point
+        objection = self.geofence.shut_out(point)
+        outcome = Outcome(Verdict.DENIED, f"home {objection}") if objection else self._places.move_home(point)
         if not outcome.ok:
             return outcome
         self.home_heading_rad = (
@@ -255,12 +264,15 @@ class Commander:
     def restart(self, heading_rad: float) -> None:
         """As after power-on: disarmed in Hold at the start point; home, plan and parameters stay."""
         self.mode, self.armed, self.failsafe = Mode.HOLD, False, ""
-        self._terminated, self.changed, self.tipped_over = False, True, False
-        self._contact = ground.Contact(Effort.OFF, Landed.ON_GROUND)
+        self._terminated, self.changed = False, True
+        self._footing.restart()
+        self._battery.restart()
         self._fix = Fix.at_rest(self._fix.now_us, heading_rad)
         self._takeoff.forget()
         self._sticks.centre()
-        self._guide.standing, self._guide.speed_m_s = True, None
+        self.guided.leave()
+        self.gaze.forget()
+        self._guide.speed_m_s = None
         self._guide.put(rest_at(0.0, 0.0, 0.0, heading_rad))
         self.guidance = self._guidance()
 
@@ -268,9 +280,12 @@ class Commander:
 
     def _switch(self, mode: Mode) -> None:
         self.changed = True
+        self.guided.leave()
         if mode is not self.mode:
             if self.mode is Mode.MISSION:
                 self._executor.leave()
+            if (self.mode, mode) not in _KEEP_GAZE:
+                self.gaze.forget()
             self._guide.speed_m_s = None
             self.mode = mode
             self.failsafe = ""
@@ -281,9 +296,8 @@ class Commander:
     def _begin(self, mode: Mode) -> None:
         """Put the first trajectory of a mode in force."""
         fix, guide = self._fix, self._guide
-        if self.standing:
-            self._contact = self._contact._replace(down_since_us=None)
-        if mode in (Mode.HOLD, Mode.POSITION):
+        self._footing.stand_anew()
+        if mode in (Mode.HOLD, Mode.POSITION, Mode.ORBIT):
             guide.stop(fix)
             self._sticks.centre()
         elif mode is Mode.TAKEOFF:
@@ -314,6 +328,11 @@ class Commander:
         elif progress is Progress.RETURN:
             self._happened(Happening.RETURN_ITEM)
 
+    def _tick_orbit(self) -> None:
+        self.guided.tick(self._fix)
+        if self.guided.orbiting is None:
+            self._happened(Happening.ORBIT_COMPLETE)
+
     def _tick_offboard(self) -> None:
         if self._offboard.lost(self._fix.now_us):
             self._happened(Happening.TARGETS_LOST)
@@ -321,7 +340,8 @@ class Commander:
             self._following.tick(self._fix)
 
     _MODES: dict[Mode, Callable[["Commander"], None]] = {  # noqa: RUF012
-        Mode.HOLD: lambda self: None,
+        Mode.HOLD: lambda self: self.guided.tick(self._fix),
+        Mode.ORBIT: _tick_orbit,
         Mode.POSITION: _tick_position,
         Mode.TAKEOFF: _tick_takeoff,
         Mode.LAND: lambda self: self._landing.tick(self._fix),
@@ -330,41 +350,32 @@ class Commander:
         Mode.OFFBOARD: _tick_offboard,
     }
 
-    def _happened(self, happening: Happening) -> None:
-        """Go where AFTER points."""
+    def _happened(self, happening: Happening, detail: str = "") -> None:
+        """Go where AFTER points; with a detail it is told even where it points nowhere."""
         follows = after(self.mode, happening, self._p)
+        loss = happening in LOSSES
+        parts = [happening.value, detail, follows.value if follows else ""]
+        if follows is not None or detail:
+            self._tell(Severity.WARNING if loss else Severity.INFO, ": ".join(part for part in parts if part))
         if follows is None:
             return
-        loss = happening in LOSSES
-        self._tell(Severity.WARNING if loss else Severity.INFO, f"{happening.value}: {follows.value}")
         self._switch(follows)
         if loss:
             self.failsafe = happening.value
 
-    # ground and attitude
+    # what is watched in every mode
 
     def _watch_ground(self) -> None:
         """Decide between idling on the ground and flying; disarm after a landing."""
-        fix, stood = self._fix, self.standing
-        high = fix.nav.down_m < -ground.NEAR_GROUND_M and not fix.feet_down
-        if high and self.landed is Landed.IN_AIR and not self._is_landing() and self.mode is not Mode.TAKEOFF:
-            return  # nothing that the reference could change
-        r = self._guide.reference(fix)
-        intent = ground.Intent(self.mode is Mode.TAKEOFF, self._is_landing())
-        self._now_in(ground.contact(self._contact, fix.now_us, fix.nav, fix.feet_down, r, intent))
-        if not stood:
-            if self.standing and intent.landing:
-                self._guide.put(rest_at(fix.nav.north_m, fix.nav.east_m, 0.0, r.heading_rad))
-            return
-        finished = intent.landing or (self.mode is Mode.MISSION and self._mission.state is MissionState.COMPLETE)
-        if self.standing and finished and self._contact.standing_s(fix.now_us) >= self._p["COM_DISARM_LAND"]:
+        fix, landing = self._fix, self._is_landing()
+        lifting = self._following.lifting if self.mode is Mode.OFFBOARD else None
+        down = self._footing.watch(fix, ground.Intent(self.mode is Mode.TAKEOFF, landing, lifting))
+        if down and landing:
+            heading = self._guide.reference(fix).heading_rad
+            self._guide.put(rest_at(fix.nav.north_m, fix.nav.east_m, 0.0, heading))
+        finished = landing or (self.mode is Mode.MISSION and self._mission.state is MissionState.COMPLETE)
+        if self.standing and finished and self._footing.standing_s(fix.now_us) >= self._p["COM_DISARM_LAND"]:
             self._disarm()
-
-    def _now_in(self, contact: ground.Contact) -> None:
-        landed, self._contact = self.landed, contact
-        self._guide.standing = contact.standing
-        if contact.landed is not landed:
-            self._events.add(EventKind.LANDED, Severity.INFO, contact.landed.value)
 
     def _is_landing(self) -> bool:
         return (
@@ -374,21 +385,52 @@ class Commander:
         )
 
     def _watch_tilt(self) -> None:
-        """Notice a vehicle that lies on the ground, and stop its motors."""
-        fix, before = self._fix, self.tipped_over
-        self._tilt = ground.tilt(self._tilt, fix.now_us, fix.nav, fix.feet_down)
-        if self.tipped_over and not before:
+        """Stop the motors of a vehicle that lies on the ground."""
+        if self._footing.watch_tilt(self._fix):
             self._tell(Severity.CRITICAL, "the vehicle has tipped over: motors stopped")
             if self.armed:
                 self._disarm()
 
+    def _watch_fence(self) -> None:
+        outside = self.geofence.breach.outside
+        violation = self.geofence.watch(self._fix, not self.standing, self._p["MPC_ACC_HOR"])
+        if self.geofence.breach.outside is not outside:
+            self._events.add(EventKind.FENCE, Severity.INFO, "")
+        if violation is None:
+            return
+        self._happened(Happening.FENCE_BREACHED, violation.reason)
+        if self._p["GF_ACTION"] == _TERMINATE:
+            self.terminate()
+
+    def _watch_plans(self) -> None:
+        """Tell of a mission that leaves the fence when either changes, and don't fly it on."""
+        objection = self._feasibility.news(self._fix.position_N)
+        if not objection:
+            return
+        if self.armed and self.mode is Mode.MISSION:
+            self._happened(Happening.MISSION_OUTSIDE, objection)
+        else:
+            self._tell(Severity.WARNING, f"mission can't be started: {objection}")
+
+    def watch_battery(self, remaining: float) -> None:
+        """Told by the vehicle how full its battery is, 0 … 1."""
+        level = self._battery.watch(remaining)
+        if level is None or not self.armed:
+            return
+        if level is Level.LOW:
+            self._tell(Severity.WARNING, f"battery low: {100.0 * remaining:.0f} %")
+        else:
+            critical = level is Level.CRITICAL
+            happening = Happening.BATTERY_CRITICAL if critical else Happening.BATTERY_EMERGENCY
+            self._happened(happening, f"{100.0 * remaining:.0f} %")
+
     def _disarm(self) -> None:
         self.armed = False
         self.changed = True
-        landed = Landed.ON_GROUND if self._fix.feet_down or self.tipped_over else self.landed
-        self._now_in(ground.Contact(Effort.OFF, landed))
+        self._footing.stop(self._fix.feet_down)
         self._guide.rest_here(self._fix)
         self._events.add(EventKind.ARMED, Severity.INFO, "disarmed", 0)
+        self.guided.leave()
         self._happened(Happening.DISARMED)
         self.failsafe = ""
 
@@ -398,7 +440,9 @@ class Commander:
 
 _CONDITIONS: dict[str, Callable[[Commander], str]] = {
     "has_mission": lambda c: "" if c._mission.items else "there is no mission",
-    "streaming": lambda c: (
-        "" if c._offboard.streaming(c._fix.now_us) else "no stream of targets above 2 Hz in the last second"
+    "mission_inside": lambda c: c._feasibility.objection(c._fix.position_N),
+    "asked_to_orbit": lambda c: "" if c.mode is Mode.ORBIT else "it takes a centre and a radius: command DO_ORBIT",
+    "targets_alive": lambda c: (
+        f"no target in the last {c._p['COM_OF_LOSS_T']:g} s" if c._offboard.lost(c._fix.now_us) else ""
     ),
 }

@@ -5,13 +5,17 @@ from collections.abc import Callable
 from enum import Enum
 
 from sitl.geodesy import GeoPoint
+from sitl.onboard.circles import Circle
 from sitl.onboard.events import EventLog
+from sitl.onboard.gaze import Gaze, Look
 from sitl.onboard.guide import Fix, Guide
 from sitl.onboard.landing import Landing
-from sitl.onboard.mission import INSTANT, LEAST_HEIGHT_M, ItemCommand, Mission, MissionItem, MissionState, has_place
+from sitl.onboard.mission import Mission, MissionState
+from sitl.onboard.mission_items import INSTANT, LANDINGS, LEAST_HEIGHT_M, TAKEOFFS, ItemCommand, has_place, roi_point
 from sitl.onboard.modes import EventKind, Outcome, Severity
 from sitl.onboard.parameters import Parameters
 from sitl.onboard.places import Places
+from sitl.onboard.plan import MissionItem
 from sitl.quaternion import Vec3
 
 _JUMPS_A_TICK = 100  # a plan of jumps alone must not hang the vehicle
@@ -19,8 +23,8 @@ _SHARP_RAD = math.radians(60.0)
 _LEAST_CLIMB_M = 0.5  # of a take-off item, wherever it starts from
 _LOOK_AHEAD = 20  # items looked through for the next place
 
-_TAKEOFFS = (ItemCommand.TAKEOFF, ItemCommand.VTOL_TAKEOFF)
-_LANDINGS = (ItemCommand.LAND, ItemCommand.VTOL_LAND)
+_WITH_HEADING = (ItemCommand.WAYPOINT, ItemCommand.LOITER_UNLIMITED, *TAKEOFFS, *LANDINGS)
+_HOLDING = (ItemCommand.WAYPOINT, ItemCommand.SPLINE_WAYPOINT, ItemCommand.LOITER_TIME)
 _DELAYS = (ItemCommand.DELAY, ItemCommand.CONDITION_DELAY)
 
 
@@ -43,17 +47,18 @@ class Executor:
         events: EventLog,
         guide: Guide,
         places: Places,
+        gaze: Gaze,
         set_home: Callable[[GeoPoint | None], Outcome],
     ) -> None:
         self._mission, self._p, self._events, self._guide = mission, parameters, events, guide
-        self._places, self._set_home = places, set_home
+        self._places, self._gaze, self._set_home = places, gaze, set_home
         self._landing = Landing(parameters, guide)
         self._begun = False  # the current item has been started
         self._complete = False
         self._revision = -1
         self._wait_until_s: float | None = None  # end of a hold or delay; inf: for ever; None: not waiting
         self._point: Vec3 = (0.0, 0.0, 0.0)
-        self._centre: Vec3 = (0.0, 0.0, 0.0)
+        self._circle = Circle((0.0, 0.0, 0.0), 1.0)
         self._rising = False  # straight up from the ground before the item proper
         self._orbiting = False
         self._jumps: dict[int, int] = {}  # by index of the jump: how many are left
@@ -130,12 +135,12 @@ class Executor:
     def _begin(self, item: MissionItem, fix: Fix) -> int | None:
         """Start an item; an item that is done at once returns the index to go on with."""
         guide, here, command = self._guide, fix.position_N, item.command
-        if command in _TAKEOFFS:
+        if command in TAKEOFFS:
             # straight up first; where the item names another place, the next waypoint goes there
             least = here[2] - _LEAST_CLIMB_M if guide.standing else here[2]
             self._point = (here[0], here[1], min(self._places.of(item, here)[2], least))
             guide.go(fix, self._point, self._heading(item))
-        elif command in _LANDINGS:
+        elif command in LANDINGS:
             place = self._places.of(item, here)
             self._point = (place[0], place[1], here[2])
             if guide.standing:  # it has landed, wherever that is
@@ -143,23 +148,17 @@ class Executor:
             else:
                 guide.go(fix, self._point, self._heading(item))
         elif command == ItemCommand.LOITER_TURNS:
-            self._centre = self._flyable(item, here)
             radius = abs(item.param3) if math.isfinite(item.param3) and item.param3 != 0.0 else 2.0
-            north, east = here[0] - self._centre[0], here[1] - self._centre[1]
-            angle = math.atan2(east, north) if math.hypot(north, east) > 0.1 else 0.0
-            n, e = self._centre[0] + radius * math.cos(angle), self._centre[1] + radius * math.sin(angle)
-            self._go_to(fix, (n, e, self._centre[2]))
+            self._circle = Circle(self._flyable(item, here), radius)
+            self._go_to(fix, self._circle.entry(here))
         elif has_place(item):
             self._go_to(fix, self._flyable(item, here), item)
         elif command in _DELAYS:
             guide.stop(fix)
             self._wait_until_s = fix.t_s + max(0.0, item.param1)
         elif command == ItemCommand.CONDITION_YAW:
-            turn = math.radians(item.param1)
-            if item.param4 == 1.0:  # relative, in the direction of param3
-                turn = guide.reference(fix).heading_rad + (-turn if item.param3 < 0 else turn)
             if not guide.standing:
-                guide.turn(fix, turn)
+                self._turn(fix, item)
         elif command == ItemCommand.CONDITION_DISTANCE and self._following() is not None:
             following = self._following()
             assert following is not None
@@ -167,6 +166,14 @@ class Executor:
         else:
             return self._do(item, fix)
         return None
+
+    def _turn(self, fix: Fix, item: MissionItem) -> None:
+        """CONDITION_YAW: param2 the rate, 0: the usual; param3 the way; param4 1: from the heading now."""
+        turn, way = math.radians(item.param1), int(math.copysign(1.0, item.param3)) if item.param3 else 0
+        if item.param4 == 1.0:
+            turn = self._guide.reference(fix).heading_rad + (-turn if way < 0 else turn)
+        rate = math.radians(item.param2) if item.param2 > 0.0 else None
+        self._guide.turn(fix, turn, way, rate)
 
     def _flyable(self, item: MissionItem, here: Vec3) -> Vec3:
         """The item's point, but never in the ground."""
@@ -201,6 +208,10 @@ class Executor:
         elif item.command == ItemCommand.DO_SET_HOME:
             there = self._places.global_of(self._places.of(item, fix.position_N))
             self._set_home(None if item.param1 == 1.0 else there)
+        elif roi_point(item):
+            self._gaze.at(Look.POINT, self._places.of(item, fix.position_N))
+        elif item.command in (ItemCommand.DO_SET_ROI_NONE, ItemCommand.DO_SET_ROI):
+            self._gaze.forget()
         self._reached(index)
         return index + 1
 
@@ -223,7 +234,7 @@ class Executor:
             return self._passed(guide.standing or guide.done(fix), index)
         if command == ItemCommand.CONDITION_DISTANCE:
             return self._passed(math.dist(self._point, fix.position_N) <= max(item.param1, self._radius(item)), index)
-        if command in _LANDINGS:
+        if command in LANDINGS:
             return self._landed(fix, index)
         if command == ItemCommand.LOITER_TURNS:
             return self._orbited(item, fix, index)
@@ -241,7 +252,7 @@ class Executor:
         if not done and not self._passes(item):
             return False
         self._reached(index)
-        hold = item.param1 if item.command in (ItemCommand.WAYPOINT, ItemCommand.LOITER_TIME) else 0.0
+        hold = item.param1 if item.command in _HOLDING else 0.0
         self._wait_until_s = fix.t_s + (hold if math.isfinite(hold) else 0.0)
         if item.command == ItemCommand.LOITER_UNLIMITED or item.autocontinue == 0:
             self._wait_until_s = math.inf
@@ -249,8 +260,8 @@ class Executor:
 
     def _passes(self, item: MissionItem) -> bool:
         """Whether the item is done within its radius; others are flown to their point, at rest."""
-        plain = item.command == ItemCommand.WAYPOINT and not item.param1 > 0.0 and item.autocontinue != 0
-        return plain and self._following() is not None
+        point = item.command in (ItemCommand.WAYPOINT, ItemCommand.SPLINE_WAYPOINT)
+        return point and not item.param1 > 0.0 and item.autocontinue != 0 and self._following() is not None
 
     def _passed(self, done: bool, index: int) -> bool:
         if done:
@@ -275,9 +286,8 @@ class Executor:
         if not self._orbiting:
             self._orbiting = True
             clockwise = -1.0 if item.param3 < 0 else 1.0
-            radius = math.dist(self._point[:2], self._centre[:2])
             if item.param1 > 0.0:
-                self._guide.orbit(fix, self._centre, radius, clockwise * item.param1)
+                self._guide.turns(fix, self._circle, clockwise * item.param1)
                 return False
         self._reached(index)
         return True
@@ -289,7 +299,8 @@ class Executor:
         return own if math.isfinite(own) and own > 0.0 else self._p["NAV_ACC_RAD"]
 
     def _heading(self, item: MissionItem) -> float | None:
-        return math.radians(item.param4) if math.isfinite(item.param4) else None
+        turns = item.command in _WITH_HEADING and math.isfinite(item.param4)
+        return math.radians(item.param4) if turns else None
 
     def _following(self) -> MissionItem | None:
         """The item flown after the current one, if it goes to a place in flight."""
@@ -303,11 +314,15 @@ class Executor:
             elif item.command in INSTANT or item.command == ItemCommand.DO_JUMP:
                 index += 1
             else:
-                return item if has_place(item) and item.command not in (*_TAKEOFFS, *_LANDINGS) else None
+                return item if has_place(item) and item.command not in (*TAKEOFFS, *LANDINGS) else None
         return None
 
     def _arrival(self, item: MissionItem, fix: Fix) -> Vec3:
-        """Velocity at a waypoint that is flown through: along the mean of both legs, less the sharper the corner."""
+        """Velocity at a waypoint that is flown through.
+
+        Along the mean of both legs, less the sharper the corner; on a spline along the line from the point before to
+        the point after (Catmull-Rom), however sharp that is.
+        """
         here, following = fix.position_N, self._following()
         if not self._passes(item) or following is None or following.command == ItemCommand.LOITER_TURNS:
             return (0.0, 0.0, 0.0)
@@ -318,13 +333,19 @@ class Executor:
         if min(length_1, length_2) < 1.0:
             return (0.0, 0.0, 0.0)
         cos = max(-1.0, min(1.0, sum(a * b for a, b in zip(one, two, strict=True)) / (length_1 * length_2)))
-        if math.acos(cos) >= _SHARP_RAD:
+        if item.command == ItemCommand.SPLINE_WAYPOINT:
+            along, share = tuple(a + b for a, b in zip(one, two, strict=True)), math.sqrt(0.5 * (1.0 + cos))
+        elif math.acos(cos) < _SHARP_RAD:
+            along = tuple(a / length_1 + b / length_2 for a, b in zip(one, two, strict=True))
+            share = math.cos(0.5 * math.pi * math.acos(cos) / _SHARP_RAD)
+        else:
+            return (0.0, 0.0, 0.0)
+        length = math.hypot(*along)
+        if length < 1e-6:
             return (0.0, 0.0, 0.0)
         m = self._guide.limits()
-        mean = tuple(a / length_1 + b / length_2 for a, b in zip(one, two, strict=True))
-        length = math.hypot(*mean)
-        n, e, d = (x / length for x in mean)
+        n, e, d = (x / length for x in along)
         speed = math.sqrt(0.5 * min(m.acceleration_m_s2, m.climb_m_s2, m.descent_m_s2) * min(length_1, length_2))
         speed = min(speed, m.speed_m_s, (m.climb_m_s if d < 0.0 else m.descent_m_s) / max(abs(d), 1e-6))
-        k = speed * math.cos(0.5 * math.pi * math.acos(cos) / _SHARP_RAD)
+        k = speed * share
         return (k * n, k * e, k * d)

@@ -10,6 +10,7 @@ from typing import NamedTuple
 from sitl.control.guidance import Effort
 from sitl.control.reference import Reference
 from sitl.navigation import NavState
+from sitl.onboard.guide import Fix
 from sitl.onboard.modes import Landed
 
 _LIFT_M, _LIFT_M_S = 0.03, 0.001  # a reference this far above the ground, or rising so fast, means to fly
@@ -42,6 +43,7 @@ class Intent(NamedTuple):
 
     taking_off: bool
     landing: bool
+    lifting: bool | None = None  # whether the thrust lifts, where it is given; None: the reference tells
 
     @property
     def flying_is(self) -> Landed:
@@ -50,16 +52,17 @@ class Intent(NamedTuple):
         return Landed.TAKING_OFF if self.taking_off else Landed.IN_AIR
 
 
-def contact(c: Contact, now_us: int, nav: NavState, feet_down: int, r: Reference, intent: Intent) -> Contact:
+def contact(c: Contact, fix: Fix, r: Reference, intent: Intent) -> Contact:
     """The contact now, from the one of the last tick."""
+    now_us, nav, feet_down = fix
     if c.standing:
         rises = r.down_m < nav.down_m - _LIFT_M or r.v_down_m_s < -_LIFT_M_S
-        if rises and not intent.landing:
+        if intent.lifting or (rises and intent.lifting is None and not intent.landing):
             return Contact(Effort.FLY, Landed.TAKING_OFF if intent.taking_off else Landed.IN_AIR)
         return c if c.down_since_us is not None else c._replace(down_since_us=now_us)
     landed = intent.flying_is
     # where the vehicle takes off from is the ground; a reference at or below it means to stand
-    grounded = r.down_m > -_TOUCH_M and r.v_down_m_s > -_LIFT_M_S
+    grounded = r.down_m > -_TOUCH_M and r.v_down_m_s > -_LIFT_M_S if intent.lifting is None else not intent.lifting
     near = nav.down_m >= -NEAR_GROUND_M or feet_down > 0
     calm = abs(nav.v_down_m_s) < _TOUCH_M_S and math.hypot(nav.v_north_m_s, nav.v_east_m_s) < 2.0 * _TOUCH_M_S
     if not (near and grounded and calm):

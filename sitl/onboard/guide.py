@@ -3,15 +3,24 @@
 import math
 from typing import NamedTuple
 
+import numpy as np
+
+from sitl.control.guidance import STRAIGHT, Steering
 from sitl.control.reference import Reference, Trajectory, rest_at
-from sitl.frames import heading, standing
+from sitl.frames import heading, standing, wrap_pi
 from sitl.navigation import NavState
+from sitl.onboard.circles import Circle, orbit, turns_at_rest
 from sitl.onboard.parameters import Parameters
-from sitl.onboard.trajectory import COAST_S, Limits, Motion, at, circle, plan, stopping, to_point
+from sitl.onboard.timing import HEADING_RAD_S2
+from sitl.onboard.trajectory import COAST_S, Limits, Motion, at, plan, stopping, to_point
 from sitl.quaternion import Vec3
 
 _NEAR_M, _NEAR_M_S = 2.0, 2.0  # a reference further from the vehicle than this is not where to go on from
+_RENEW_S = 2.0  # an orbit without end is prolonged so long before its trajectory ends
+_FACE_PER_S = 5.0  # heading rate for a heading error, near the bearing to face
+_FACE_S, _STILL_RAD_S = 0.1, 0.01
 _FOLLOW_ALL = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
+_FOLLOW_NOTHING = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Fix(NamedTuple):
@@ -55,8 +64,10 @@ class Guide:
         self._p = parameters
         self.trajectory: Trajectory = rest_at(0.0, 0.0, 0.0, heading_rad)
         self.follow = _FOLLOW_ALL
+        self.steering = STRAIGHT
+        self.faced = False  # the heading is `face`'s, not the trajectory's own
         self.standing = True
-        self._done_s = 0.0
+        self.done_s = 0.0  # when the trajectory has done what it is for
         self.speed_m_s: float | None = None  # asked for in flight; None: MPC_XY_CRUISE
 
     def limits(self, speed_m_s: float | None = None) -> Limits:
@@ -98,12 +109,18 @@ class Guide:
         done_s: float | None = None,
     ) -> None:
         """Put a trajectory in force. done_s: when it has done what it is for; None: at its end."""
-        self.trajectory, self.follow = trajectory, follow
-        self._done_s = trajectory.end_s if done_s is None else done_s
+        self.trajectory, self.follow, self.steering = trajectory, follow, STRAIGHT
+        self.faced = False
+        self.done_s = trajectory.end_s if done_s is None else done_s
 
     def rest_here(self, fix: Fix) -> None:
         """Stand still where the vehicle is."""
         self.put(rest_at(*fix.position_N, fix.heading_rad))
+
+    def steer(self, fix: Fix, steering: Steering) -> None:
+        """Fly an attitude or body rates; no trajectory binds."""
+        self.put(rest_at(*fix.position_N, fix.heading_rad), _FOLLOW_NOTHING)
+        self.steering = steering
 
     def stop(self, fix: Fix) -> None:
         """Come to rest smoothly; standing, stay."""
@@ -147,24 +164,69 @@ class Guide:
         """Level to above a place."""
         self.put(plan(fix.t_s, self.motion(fix), self.limits(), level_N=(north_m, east_m)))
 
-    def turn(self, fix: Fix, heading_rad: float) -> None:
-        """To a heading, on the spot."""
-        self.put(plan(fix.t_s, self.motion(fix), self.limits(), heading_rad=heading_rad))
+    def turn(self, fix: Fix, heading_rad: float, way: int = 0, rate_rad_s: float | None = None) -> None:
+        """To a heading, on the spot: way 0 the short way round, 1 clockwise, −1 anticlockwise."""
+        limits = self.limits()
+        if rate_rad_s is not None:
+            limits = limits._replace(heading_rad_s=min(rate_rad_s, limits.heading_rad_s))
+        self.put(plan(fix.t_s, self.motion(fix), limits, heading_rad=heading_rad, way=way))
 
     def sink(self, fix: Fix, speed_m_s: float, floor_down_m: float) -> None:
         """Descend straight down at up to `speed_m_s` to `floor_down_m`, which may lie below the ground."""
         limits = self.limits()._replace(descent_m_s=speed_m_s)
         self.put(plan(fix.t_s, self.motion(fix), limits, down_m=floor_down_m))
 
-    def orbit(self, fix: Fix, centre_N: Vec3, radius_m: float, turns: float) -> None:
-        """Turns around a centre, from the point of the circle where the reference stands."""
+    def turns(self, fix: Fix, circle: Circle, turns: float) -> None:
+        """Turns around a circle, from its point where the reference stands."""
         r = self.reference(fix)
-        angle = math.atan2(r.east_m - centre_N[1], r.north_m - centre_N[0])
-        self.put(circle(fix.t_s, centre_N, radius_m, angle, turns, r.heading_rad, self.limits()))
+        angle = circle.angle((r.north_m, r.east_m, r.down_m))
+        self.put(turns_at_rest(fix.t_s, circle, angle, turns, r.heading_rad, self.limits()))
+
+    def orbit(self, fix: Fix, circle: Circle, rate_rad_s: float, total_rad: float = math.inf) -> None:
+        """An orbit at a constant angular rate, from its point where the reference rests."""
+        self._orbit(fix, circle, rate_rad_s, total_rad, moving=False)
+
+    def keep_orbiting(self, fix: Fix, circle: Circle, rate_rad_s: float) -> None:
+        """Prolong an orbit without end in time."""
+        if fix.t_s > self.trajectory.end_s - _RENEW_S:
+            self._orbit(fix, circle, rate_rad_s, math.inf, moving=True)
+
+    def _orbit(self, fix: Fix, circle: Circle, rate_rad_s: float, total_rad: float, moving: bool) -> None:
+        r, limits = self.reference(fix), self.limits()
+        angle = circle.angle((r.north_m, r.east_m, r.down_m))
+        path = orbit(fix.t_s, circle, angle, rate_rad_s, r.heading_rad, limits, moving=moving, total_rad=total_rad)
+        if moving:  # the heading turns on
+            path.coefficients[:, 3, 0] += r.heading_rate_rad_s * (path.start_s - fix.t_s)
+            path.coefficients[:, 3, 1] = r.heading_rate_rad_s
+        self.put(path)
+
+    def face(self, fix: Fix, bearing_rad: float | None) -> None:
+        """Turn toward a bearing, whatever heading the trajectory has of its own; to be renewed every tick.
+
+        None: turn no further, after which it needs no renewing.
+        """
+        r, wanted = self.reference(fix), 0.0
+        if bearing_rad is not None:
+            error = wrap_pi(bearing_rad - r.heading_rad)
+            most = min(self.limits().heading_rad_s, _FACE_PER_S * abs(error), math.sqrt(HEADING_RAD_S2 * abs(error)))
+            wanted = math.copysign(most, error)
+        spin = max(-HEADING_RAD_S2, min(HEADING_RAD_S2, (wanted - r.heading_rate_rad_s) / _FACE_S))
+        self.faced = bearing_rad is not None or abs(r.heading_rate_rad_s) > _STILL_RAD_S
+        rate, spin = (r.heading_rate_rad_s, spin) if self.faced else (0.0, 0.0)
+        t = self.trajectory
+        if fix.t_s >= t.end_s:
+            t = rest_at(r.north_m, r.east_m, r.down_m, 0.0)._replace(start_s=np.array([fix.t_s]), end_s=math.inf)
+        coefficients = t.coefficients.copy()
+        since = fix.t_s - t.start_s
+        coefficients[:, 3, 0] = r.heading_rad - since * (rate - 0.5 * since * spin)
+        coefficients[:, 3, 1] = rate - since * spin
+        coefficients[:, 3, 2] = 0.5 * spin
+        coefficients[:, 3, 3:] = 0.0
+        self.trajectory = t._replace(coefficients=coefficients)
 
     def done(self, fix: Fix) -> bool:
         """Whether the trajectory has done what it is for."""
-        return fix.t_s >= self._done_s
+        return fix.t_s >= self.done_s
 
 
 def _chosen(flags: tuple[float, ...], one: Vec3, other: Vec3) -> Vec3:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 class Mode(Enum):
     POSITION = "position"
+    ORBIT = "orbit"
     TAKEOFF = "takeoff"
     HOLD = "hold"
     MISSION = "mission"
@@ -64,7 +65,8 @@ class EventKind(Enum):
     ITEM_REACHED = "item reached"  # value: index of the mission item
     ITEM_CURRENT = "item current"  # value: index of the mission item
     PARAMETER = "parameter"  # text: its name
-    MISSION = "mission"  # the stored plan was replaced or cleared
+    PLAN = "plan"  # the stored mission, fence or rally points were replaced or cleared
+    FENCE = "fence"  # it was left, or entered again
     HOME = "home"
 
 

@@ -1,7 +1,7 @@
 """Targets streamed from outside: their age, and the smooth reference made of them."""
 
 import math
-from collections import deque
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -9,15 +9,13 @@ import numpy as np
 from sitl.control.reference import DEGREE, Trajectory
 from sitl.onboard.modes import ACCEPTED, Outcome, Verdict
 from sitl.onboard.parameters import Parameters
-from sitl.quaternion import Vec3
+from sitl.quaternion import Quat, Vec3
 
 _STAMP_WINDOW_US = 1_000_000  # a stamp further than this from now is not of the vehicle's clock
 _REORDERED_US = 200_000  # a stamp older than the newest by no more comes from the same clock, late
 _CARRY_S = 0.2  # a target is carried forward by this much at most
 _SPACING_S = (0.005, 0.2)  # of two targets whose accelerations tell a jerk
 _JERK_MAX = 20.0  # m/s³
-_STREAM_GAP_US = 500_000  # more than 2 Hz
-_STREAM_SPAN_US = 1_000_000
 _NONE: Vec3 = (math.nan, math.nan, math.nan)
 
 
@@ -39,16 +37,38 @@ class OffboardTarget(NamedTuple):
     heading_rate_rad_s: float = math.nan
 
 
-class Offboard:
-    """The newest target, whether a stream of them is alive, and the trajectory they make.
+class AttitudeTarget(NamedTuple):
+    """How to hold the body and how hard to push.
 
-    `trajectory` and `follow` change with every target; `number` counts them.
+    q_NB: None where only the rates bind. rates_B [rad/s]: beside an attitude, how it turns.
+    thrust: 0 … 1, a share of the largest.
     """
 
-    def __init__(self, parameters: Parameters) -> None:
-        self._parameters = parameters
-        self._arrivals: deque[int] = deque(maxlen=64)
+    q_NB: Quat | None
+    rates_B: Vec3
+    thrust: float
+
+
+class Offboard:
+    """The newest target, whether they keep coming, and the trajectory they make.
+
+    `trajectory` and `follow` change with every target; `number` counts them. The newest is in `target` or, where it
+    tells an attitude, in `attitude`. objection(point_N, what): why a position may not be flown to, or nothing.
+    thrust_full_N, thrust_hover_N: the largest thrust, and the one that carries the vehicle.
+    """
+
+    def __init__(
+        self,
+        parameters: Parameters,
+        objection: Callable[[Vec3, str], str],
+        thrust_full_N: float,
+        thrust_hover_N: float,
+    ) -> None:
+        self._parameters, self._objection = parameters, objection
+        self.thrust_full_N, self.thrust_hover_N = thrust_full_N, thrust_hover_N
+        self._arrived_us: int | None = None
         self.target: OffboardTarget | None = None
+        self.attitude: AttitudeTarget | None = None
         self.number = 0
         self._stamp_us = 0
         self._stamped = False  # the stamp is the target's own
@@ -71,7 +91,10 @@ class Offboard:
             return Outcome(Verdict.DENIED, "offboard target ignores everything")
         if any(abs(x) > 1e6 for x in numbers if not math.isnan(x)):
             return Outcome(Verdict.DENIED, "offboard target is further than 1000 km or faster than sense")
-        self._arrivals.append(now_us)
+        outside = self._objection(target.position_N, "offboard target")
+        if outside:
+            return Outcome(Verdict.DENIED, outside)
+        self._arrived_us = now_us
         stamp = target.stamp_us
         stamped = stamp is not None and abs(now_us - stamp) <= _STAMP_WINDOW_US
         if stamp is None or not stamped:
@@ -80,6 +103,24 @@ class Offboard:
             return ACCEPTED
         self._jerk = self._estimated_jerk(target, stamp)
         self.target, self._stamp_us, self._stamped = target, stamp, stamped
+        self.attitude = None
+        self.number += 1
+        return ACCEPTED
+
+    def submit_attitude(self, target: AttitudeTarget, now_us: int) -> Outcome:
+        """Take an attitude or body rates with a thrust. Refused when a number is missing or out of range."""
+        length = math.hypot(*target.q_NB) if target.q_NB is not None else 1.0
+        if not all(map(math.isfinite, (length, *target.rates_B, target.thrust))):
+            return Outcome(Verdict.DENIED, "attitude target is not finite")
+        if not 0.5 < length < 2.0:
+            return Outcome(Verdict.DENIED, "attitude target: the quaternion has no direction")
+        if not 0.0 <= target.thrust <= 1.0:
+            return Outcome(Verdict.DENIED, "attitude target: the thrust must be 0 … 1")
+        if target.q_NB is not None:
+            w, x, y, z = (component / length for component in target.q_NB)
+            target = target._replace(q_NB=(w, x, y, z))
+        self._arrived_us = now_us
+        self.target, self.attitude = None, target
         self.number += 1
         return ACCEPTED
 
@@ -96,21 +137,16 @@ class Offboard:
 
     def age_s(self, now_us: int) -> float:
         """Simulation time since the newest target arrived; inf if none ever did."""
-        return (now_us - self._arrivals[-1]) * 1e-6 if self._arrivals else math.inf
+        return math.inf if self._arrived_us is None else (now_us - self._arrived_us) * 1e-6
 
     def lost(self, now_us: int) -> bool:
-        return self.age_s(now_us) > self._parameters["COM_OF_LOSS_T"]
+        """Whether no target has come for COM_OF_LOSS_T. It ends Offboard flight, and bars its beginning.
 
-    def streaming(self, now_us: int) -> bool:
-        """Whether targets have come at more than 2 Hz for the last second."""
-        last = now_us
-        for arrival in reversed(self._arrivals):
-            if last - arrival > _STREAM_GAP_US:
-                return False
-            last = arrival
-            if now_us - arrival >= _STREAM_SPAN_US:
-                return True
-        return bool(self._arrivals) and len(self._arrivals) == self._arrivals.maxlen
+        PX4 asks no more for the beginning either (its documents speak of a stream of a second; its offboardCheck
+        of one target younger than COM_OF_LOSS_T), and MAVSDK relies on that: it sets the mode right after its first
+        target. It is safe: the stream must live on or the same failsafe acts within COM_OF_LOSS_T.
+        """
+        return self.age_s(now_us) > self._parameters["COM_OF_LOSS_T"]
 
     @property
     def moving(self) -> bool:

@@ -3,8 +3,8 @@
 import math
 
 from sitl.geodesy import GeoPoint, to_global, to_local
-from sitl.onboard.mission import Frame, MissionItem
 from sitl.onboard.modes import ACCEPTED, Outcome, Verdict
+from sitl.onboard.plan import Frame, MissionItem
 from sitl.quaternion import Vec3
 
 _FAR_M = 1e5

@@ -38,7 +38,7 @@ class Sticks:
 
     def lost(self, now_us: int) -> bool:
         """Whether sticks that were in use have fallen silent."""
-        return self._arrived_us is not None and (now_us - self._arrived_us) * 1e-6 > self._p["COM_MAN_LOSS_T"]
+        return self._arrived_us is not None and (now_us - self._arrived_us) * 1e-6 > self._p["COM_RC_LOSS_T"]
 
     def tick(self, fix: Fix, guide: Guide) -> None:
         """Steer the reference's velocity toward what the sticks ask, at the acceleration limits.

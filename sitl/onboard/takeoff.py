@@ -2,8 +2,9 @@
 
 import math
 
+from sitl.onboard.geofence import Geofence
 from sitl.onboard.guide import Fix, Guide
-from sitl.onboard.mission import LEAST_HEIGHT_M
+from sitl.onboard.mission_items import LEAST_HEIGHT_M
 from sitl.onboard.modes import ACCEPTED, Outcome, Verdict
 from sitl.onboard.parameters import Parameters
 from sitl.onboard.places import Places
@@ -15,8 +16,8 @@ _MOST_M = 1000.0
 class Takeoff:
     """What was asked for last, and the climb to it."""
 
-    def __init__(self, parameters: Parameters, guide: Guide, places: Places) -> None:
-        self._p, self._guide, self._places = parameters, guide, places
+    def __init__(self, parameters: Parameters, guide: Guide, places: Places, geofence: Geofence) -> None:
+        self._p, self._guide, self._places, self._geofence = parameters, guide, places, geofence
         self.forget()
 
     def forget(self) -> None:
@@ -30,15 +31,20 @@ class Takeoff:
         low, high = ground + LEAST_HEIGHT_M, ground + _MOST_M
         if altitude is not None and not low <= altitude <= high:
             return Outcome(Verdict.DENIED, f"take-off altitude {altitude:.1f} m AMSL is outside {low:.1f} … {high:.1f}")
+        objection = self._geofence.objection((math.nan, math.nan, self._down(altitude)), "take-off")
+        if objection:
+            return Outcome(Verdict.DENIED, objection)
         self._altitude_amsl_m = altitude
         self._heading_rad = heading_rad if heading_rad is not None and math.isfinite(heading_rad) else None
         return ACCEPTED
 
+    def _down(self, altitude_amsl_m: float | None) -> float:
+        if altitude_amsl_m is None:
+            altitude_amsl_m = self._places.home.alt_amsl_m + self._p["MIS_TAKEOFF_ALT"]
+        return self._places.origin.alt_amsl_m - altitude_amsl_m
+
     def start(self, fix: Fix) -> None:
-        altitude = self._altitude_amsl_m
-        if altitude is None:
-            altitude = self._places.home.alt_amsl_m + self._p["MIS_TAKEOFF_ALT"]
-        down = self._places.origin.alt_amsl_m - altitude
+        down = self._down(self._altitude_amsl_m)
         if self._guide.standing:
             down = min(down, fix.nav.down_m - LEAST_CLIMB_M)
         self._guide.rise(fix, down, self._heading_rad)

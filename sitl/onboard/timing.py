@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 SHORTEST_S = 0.05
 _STOP_S = 0.4  # no halt is shorter
 _STILL = 1e-3  # slower than this [m/s, m/s², rad/s] counts as at rest when times are chosen
-_HEADING_RAD_S2, _HEADING_RAD_S3 = 1.5, 20.0  # angular acceleration and jerk of a turn
+HEADING_RAD_S2, _HEADING_RAD_S3 = 1.5, 20.0  # angular acceleration and jerk of a turn
 _FITS = 1.02  # peaks are sampled: so much above a limit is within it
 _SAMPLES = np.linspace(0.0, 1.0, 25)[:, None]
 _STRETCH = 1.07 ** np.arange(64.0)
@@ -197,8 +197,8 @@ def height_s(x: Axis, m: Limits) -> tuple[float, ...]:
 
 def turn_s(x: Axis, m: Limits) -> tuple[float, ...]:
     if x.p1 is None:
-        return (max(_STOP_S, 1.5 * abs(x.v0) / _HEADING_RAD_S2) if x.v0 else 0.0,)
-    rate, acceleration, jerk = m.heading_rad_s, _HEADING_RAD_S2, _HEADING_RAD_S3
+        return (max(_STOP_S, 1.5 * abs(x.v0) / HEADING_RAD_S2) if x.v0 else 0.0,)
+    rate, acceleration, jerk = m.heading_rad_s, HEADING_RAD_S2, _HEADING_RAD_S3
     if x.moving:
         excess = _line_excess(x, rate, rate, acceleration, acceleration, jerk)
         times = _times_s((x,), excess, _least_s((x,), rate, acceleration, jerk))

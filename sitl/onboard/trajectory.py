@@ -12,10 +12,10 @@ import numpy as np
 
 from sitl.control.reference import DEGREE, Reference, Trajectory
 from sitl.onboard import timing
-from sitl.onboard.timing import SHORTEST_S, Axis, Limits, Polynomial, evaluated, quintic, shifted
+from sitl.onboard.timing import SHORTEST_S, Axis, Limits, Polynomial, evaluated, shifted
 from sitl.quaternion import Vec3
 
-__all__ = ["COAST_S", "Limits", "Motion", "at", "circle", "heading_to", "plan", "quintic", "stopping", "to_point"]
+__all__ = ["COAST_S", "Limits", "Motion", "at", "heading_to", "plan", "stopping", "to_point"]
 
 COAST_S = 0.1  # a trajectory that arrives with a velocity goes on with it so long
 
@@ -40,9 +40,14 @@ class Motion(NamedTuple):
         )
 
 
-def heading_to(start_rad: float, target_rad: float) -> float:
-    """The target heading, reached from the start the short way round (not wrapped)."""
-    return start_rad + (target_rad - start_rad + math.pi) % (2.0 * math.pi) - math.pi
+def heading_to(start_rad: float, target_rad: float, way: int = 0) -> float:
+    """The target heading, reached from the start (not wrapped): way 0 the short way, 1 clockwise, −1 anticlockwise."""
+    full = 2.0 * math.pi
+    if way > 0:
+        return start_rad + (target_rad - start_rad) % full
+    if way < 0:
+        return start_rad - (start_rad - target_rad) % full
+    return start_rad + (target_rad - start_rad + math.pi) % full - math.pi
 
 
 def plan(
@@ -53,17 +58,18 @@ def plan(
     down_m: float | None = None,
     heading_rad: float | None = None,
     arrival_N: Vec3 = (0.0, 0.0, 0.0),
+    way: int = 0,
 ) -> Trajectory:
     """From `start` to a level position, a height and a heading; what is None comes to rest smoothly ahead.
 
     Takes the shortest times in which speed, acceleration and jerk keep to the limits; a start that is itself beyond
-    them is brought back within. `heading_rad` is reached the short way round. With `arrival_N`, which needs both a
+    them is brought back within. `heading_rad` is reached by `way`, see heading_to. With `arrival_N`, which needs both a
     level position and a height, the trajectory passes its end with that velocity, if the limits allow it, and goes on
     with it for COAST_S.
     """
     p, v, a = start.position_N, start.velocity_N, start.acceleration_N
     n1, e1 = level_N if level_N is not None else (None, None)
-    turned = None if heading_rad is None else heading_to(start.heading_rad, heading_rad)
+    turned = None if heading_rad is None else heading_to(start.heading_rad, heading_rad, way)
     north, east = Axis(p[0], v[0], a[0], n1, arrival_N[0]), Axis(p[1], v[1], a[1], e1, arrival_N[1])
     down = Axis(p[2], v[2], a[2], down_m, arrival_N[2])
     heading = Axis(start.heading_rad, start.heading_rate_rad_s, 0.0, turned)
@@ -71,7 +77,7 @@ def plan(
     if any(arrival_N):
         passing_s = timing.passing_s((north, east, down), limits)
         if not passing_s:
-            return plan(start_s, start, limits, level_N, down_m, heading_rad)
+            return plan(start_s, start, limits, level_N, down_m, heading_rad, way=way)
     level_s = passing_s or timing.level_s((north, east), limits)
     height_s = passing_s or timing.height_s(down, limits)
     turn_s = timing.turn_s(heading, limits)
@@ -126,55 +132,6 @@ def to_point(
 def stopping(start_s: float, start: Motion, limits: Limits) -> Trajectory:
     """Brings the motion and the turning to rest smoothly ahead."""
     return plan(start_s, start, limits)
-
-
-def circle(
-    start_s: float, centre_N: Vec3, radius_m: float, angle_rad: float, turns: float, heading_rad: float, limits: Limits
-) -> Trajectory:
-    """Turns around a level circle from the point at `angle_rad` (from north toward east), starting and ending at rest.
-
-    Positive turns go clockwise seen from above. The angle follows a minimum-jerk profile; pieces of the circle are
-    quintics that agree with it in position, velocity and acceleration where they meet.
-    """
-    total, r = 2.0 * math.pi * turns, radius_m
-    # at unit duration; in a time T the speed falls with T, the acceleration with T² and the jerk with T³
-    s = np.linspace(0.0, 1.0, 201)
-    rate = total * (30 * s**2 - 60 * s**3 + 30 * s**4)
-    angular = total * (60 * s - 180 * s**2 + 120 * s**3)
-    angular_jerk = total * (60 - 360 * s + 360 * s**2)
-    speed = r * float(np.abs(rate).max())
-    acceleration = r * float(np.hypot(rate**2, angular).max())
-    jerk = r * float(np.hypot(angular_jerk - rate**3, 3.0 * rate * angular).max())
-    t_total = max(
-        SHORTEST_S,
-        speed / limits.speed_m_s,
-        math.sqrt(acceleration / limits.acceleration_m_s2),
-        math.cbrt(jerk / limits.jerk_m_s3),
-    )
-    pieces = max(8, math.ceil(abs(turns) * 32))
-
-    def at(t: float) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-        """North and east there, each with velocity and acceleration."""
-        s = t / t_total
-        angle = angle_rad + total * (10 * s**3 - 15 * s**4 + 6 * s**5)
-        rate = total * (30 * s**2 - 60 * s**3 + 30 * s**4) / t_total
-        angular = total * (60 * s - 180 * s**2 + 120 * s**3) / t_total**2
-        c, n = math.cos(angle), math.sin(angle)
-        return (
-            (centre_N[0] + r * c, -r * n * rate, -r * (c * rate**2 + n * angular)),
-            (centre_N[1] + r * n, r * c * rate, r * (-n * rate**2 + c * angular)),
-        )
-
-    starts = np.linspace(0.0, t_total, pieces + 1)
-    coefficients = np.zeros((pieces, 4, DEGREE + 1))
-    coefficients[:, 2, 0] = centre_N[2]
-    coefficients[:, 3, 0] = heading_rad
-    states = [at(t) for t in starts.tolist()]
-    for k in range(pieces):
-        h = float(starts[k + 1] - starts[k])
-        for i in range(2):
-            coefficients[k, i] = quintic(*states[k][i], *states[k + 1][i], h)
-    return Trajectory(start_s + starts[:-1], coefficients, start_s + t_total)
 
 
 def at(trajectory: Trajectory, t_s: float) -> Reference:

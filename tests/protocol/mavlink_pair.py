@@ -11,7 +11,7 @@ from gcs_tools.client import Client, Script
 from gcs_tools.impairment import Impairment
 from sitl.mavlink.codec import Encoder, Frame, Parser, mav, message
 from sitl.mavlink.endpoint import Datagram, Endpoint, Identity, PortKind
-from sitl.onboard.mission import MissionItem
+from sitl.onboard.plan import MissionItem
 from sitl.vehicle import Vehicle
 from sitl.vehicle_spec import VehicleSpec
 

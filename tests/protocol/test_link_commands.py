@@ -6,11 +6,11 @@ from typing import Any
 import pytest
 from mavlink_pair import Station, Wire, World
 
-from sitl.geodesy import to_global
+from sitl.geodesy import GeoPoint, to_global
 from sitl.mavlink.actions import TABLE
 from sitl.mavlink.codec import mav
-from sitl.onboard.mission import MissionItem
 from sitl.onboard.modes import Landed, Mode
+from sitl.onboard.plan import MissionItem
 
 NAN = math.nan
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = range(5)
@@ -47,7 +47,7 @@ def test_every_command_there_is_gets_exactly_one_terminal_answer(world: World, f
 
 
 @pytest.mark.parametrize(
-    "command", [mav.MAV_CMD_DO_VTOL_TRANSITION, 420, mav.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, 34, 65535]
+    "command", [mav.MAV_CMD_DO_VTOL_TRANSITION, 420, mav.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, 84, 65535]
 )
 def test_what_is_not_done_is_unsupported(world: World, command: int) -> None:
     assert world.station().ask(command, 1) == [UNSUPPORTED]
@@ -132,7 +132,7 @@ def test_offboard_without_a_stream_is_denied_with_one_text_that_says_so(world: W
     station = world.station()
     station.forget()
     assert station.ask(mav.MAV_CMD_DO_SET_MODE, 1, 6) == [DENIED]
-    assert len([text for text in station.texts() if "stream" in text]) == 1
+    assert len([text for text in station.texts() if "no target" in text]) == 1
 
 
 @pytest.mark.parametrize(
@@ -206,7 +206,7 @@ def test_reposition_flies_to_the_point_in_both_forms_and_every_frame(world: Worl
     world.take_off(station)
     commander = world.vehicle.commander
     asked: list[Any] = []
-    commander.reposition = lambda *args: asked.append(args) or commander.hold()
+    commander.guided.reposition = lambda point, *args: asked.append((*point, *args)) or commander.hold()
     lat, lon = to_global(commander.origin, 30.0, -20.0)
     x, y = round(lat * 1e7), round(lon * 1e7)
     command = mav.MAV_CMD_DO_REPOSITION
@@ -256,7 +256,8 @@ def test_a_relative_yaw_turns_from_the_present_heading(world: World) -> None:
     station = world.station()
     world.take_off(station)
     asked: list[Any] = []
-    world.vehicle.commander.reposition = lambda *args: asked.append(args) or world.vehicle.commander.hold()
+    commander = world.vehicle.commander
+    commander.guided.reposition = lambda point, *args: asked.append((*point, *args)) or commander.hold()
     yaw = world.endpoint._link.view().attitude.yaw
     station.ask(mav.MAV_CMD_DO_REPOSITION, -1, 3, 0, 0.5, NAN, NAN, NAN)
     assert asked[0][3] == pytest.approx(yaw + 0.5, abs=1e-3)
@@ -329,11 +330,12 @@ def test_home_is_set_here_or_there_and_told_at_once(world: World) -> None:
 def test_prearm_checks_are_run_and_their_failure_told(world: World) -> None:
     station = world.station()
     assert station.ask(mav.MAV_CMD_RUN_PREARM_CHECKS) == [ACCEPTED]
-    world.vehicle.commander.tipped_over = True
+    world.vehicle.parameters.set("GF_MAX_HOR_DIST", 10.0)
+    world.vehicle.commander.set_home(GeoPoint(55.7, 37.3595, 190.0))
     station.forget()
     assert station.ask(mav.MAV_CMD_RUN_PREARM_CHECKS) == [ACCEPTED]
-    assert any("tipped" in text for text in station.texts())
-    world.vehicle.commander.tipped_over = False
+    assert any("outside the fence" in text for text in station.texts())
+    world.vehicle.commander.set_home(None)
     station.ask(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1)
     assert station.ask(mav.MAV_CMD_RUN_PREARM_CHECKS) == [REJECTED]
 

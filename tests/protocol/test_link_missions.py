@@ -9,7 +9,7 @@ from mavlink_pair import Downloader, Station, Uploader, Wire, World, item_of, se
 
 from sitl.mavlink.codec import mav
 from sitl.mavlink.mission import GIVE_UP_S
-from sitl.onboard.mission import CAPACITY, MissionItem
+from sitl.onboard.plan import CAPACITY, MissionItem
 
 ACCEPTED, ERROR, UNSUPPORTED_FRAME, UNSUPPORTED, NO_SPACE = range(5)
 INVALID_PARAM1, INVALID_SEQUENCE, DENIED, CANCELLED = 6, 13, 14, 15
@@ -368,21 +368,6 @@ def test_clearing_empties_the_plan(world: World) -> None:
         world.run(0.03)
         assert [(m.type, m.mission_type) for m in station.all("MISSION_ACK")] == [(ACCEPTED, kind)]
         assert world.vehicle.mission.items == ()
-
-
-@pytest.mark.parametrize("kind", [1, 2])
-def test_fence_and_rally_are_empty_and_take_nothing_but_emptiness(world: World, kind: int) -> None:
-    station = world.station()
-    address = {"target_system": 1, "target_component": 1, "mission_type": kind}
-    station.send("MISSION_REQUEST_LIST", **address)
-    station.send("MISSION_COUNT", count=3, **address)
-    station.send("MISSION_COUNT", count=0, **address)
-    station.send("MISSION_CLEAR_ALL", **address)
-    station.send("MISSION_REQUEST_INT", seq=0, **address)
-    world.run(0.05)
-    assert [(m.count, m.mission_type) for m in station.all("MISSION_COUNT")] == [(0, kind)]
-    results = [(m.type, m.mission_type) for m in station.all("MISSION_ACK")]
-    assert results == [(UNSUPPORTED, kind), (ACCEPTED, kind), (ACCEPTED, kind), (UNSUPPORTED, kind)]
 
 
 def test_plan_types_that_are_not_defined_are_unsupported(world: World) -> None:

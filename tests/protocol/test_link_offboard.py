@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 import pytest
-from mavlink_pair import World
+from mavlink_pair import Station, World
 
 from sitl.geodesy import to_global
 from sitl.mavlink.codec import mav
@@ -188,14 +188,6 @@ def test_stamps_are_on_the_vehicles_clock_and_unwrapped(world: World) -> None:
     assert target(world, **FIELDS, time_boot_ms=0).stamp_us is None
 
 
-def test_attitude_targets_are_not_supported_and_say_so(world: World) -> None:
-    station = world.station()
-    for _ in range(10):
-        station.send("SET_ATTITUDE_TARGET", target_system=1, target_component=1)
-        world.step()
-    assert len([text for text in station.texts() if "ttitude targets" in text]) == 1
-
-
 def test_offboard_flies_a_streamed_position_and_echoes_it(world: World) -> None:
     station = world.station()
     position_only = EVERYTHING ^ POSITION
@@ -245,3 +237,53 @@ def test_sticks_go_to_the_commander_in_its_own_scale(world: World) -> None:
         (0.0, 0.0, 0.0, 0.0),
         (1.0, -1.0, 1.0, 0.0),
     ]
+
+
+# attitude targets
+
+IGNORE_RATES, IGNORE_ATTITUDE, IGNORE_THROTTLE = 7, 0x80, 0x40
+
+
+def attitude_target(station: Station, **fields: object) -> None:
+    station.send("SET_ATTITUDE_TARGET", target_system=1, target_component=1, **fields)
+
+
+@pytest.mark.compiled
+def test_an_attitude_is_flown_as_it_was_sent_and_echoed(world: World) -> None:
+    """As MAVSDK sends it: one target, then the mode at once, then 20 a second."""
+    station = world.station()
+    world.take_off(station, 10.0)
+    half = 0.5 * math.radians(10.0)
+    a = world.vehicle.spec.airframe.airframe
+    thrust = a.mass_kg * 9.80665 / (2.0 * a.thrust_max_N)
+    q = (math.cos(half), 0.0, math.sin(half), 0.0)
+    attitude_target(station, q=q, thrust=thrust, type_mask=IGNORE_RATES)
+    assert station.ask(mav.MAV_CMD_DO_SET_MODE, 1, 6) == [0]
+    for _ in range(20):
+        attitude_target(station, q=q, thrust=thrust, type_mask=IGNORE_RATES)
+        world.run(0.05)
+    assert world.vehicle.commander.mode is Mode.OFFBOARD
+    seen, echo = station.all("ATTITUDE")[-1], station.all("ATTITUDE_TARGET")[-1]
+    assert (seen.roll, seen.pitch, seen.yaw) == pytest.approx((0.0, math.radians(10.0), 0.0), abs=math.radians(2.0))
+    assert echo.q == pytest.approx(q, abs=1e-6)
+    assert echo.thrust == pytest.approx(thrust, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("fields", "reason"),
+    [
+        ({"q": (1.0, 0.0, 0.0, 0.0), "type_mask": IGNORE_RATES | IGNORE_THROTTLE, "thrust": 0.5}, "thrust"),
+        ({"q": (1.0, 0.0, 0.0, 0.0), "type_mask": IGNORE_RATES, "thrust": 1.5}, "0 ? 1"),
+        ({"q": (1.0, 0.0, 0.0, 0.0), "type_mask": IGNORE_RATES | 0x20, "thrust": 0.5}, "along the nose"),
+        ({"q": (0.0, 0.0, 0.0, 0.0), "type_mask": IGNORE_RATES, "thrust": 0.5}, "no direction"),
+        ({"type_mask": IGNORE_ATTITUDE | 1, "thrust": 0.5}, "three body rates"),
+        ({"q": (NAN, NAN, NAN, NAN), "type_mask": IGNORE_RATES, "thrust": 0.5}, "three body rates"),
+    ],
+)
+def test_an_attitude_target_that_lacks_something_is_refused_once(world: World, fields: dict, reason: str) -> None:
+    station = world.station()
+    for _ in range(10):
+        attitude_target(station, **fields)
+        world.step()
+    assert len([text for text in station.texts() if reason in text]) == 1
+    assert station.ask(mav.MAV_CMD_DO_SET_MODE, 1, 6) == [2]

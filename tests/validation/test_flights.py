@@ -59,7 +59,7 @@ def test_a_step_without_feedforward_settles(name: str, axis: int) -> None:
     for _ in range(600):
         vehicle.offboard.submit(OffboardTarget(None, position_N=tuple(target)), vehicle.now_us)
         vehicle.advance(vehicle.now_us + 20_000)
-        if vehicle.commander.mode is not Mode.OFFBOARD and vehicle.offboard.streaming(vehicle.now_us):
+        if vehicle.commander.mode is not Mode.OFFBOARD and not vehicle.offboard.lost(vehicle.now_us):
             assert vehicle.commander.set_mode(Mode.OFFBOARD).ok
     assert vehicle.commander.mode is Mode.OFFBOARD
     assert position(vehicle.snapshot()) == pytest.approx(target, abs=0.12)
@@ -68,7 +68,7 @@ def test_a_step_without_feedforward_settles(name: str, axis: int) -> None:
 def test_a_new_gain_acts_at_the_very_next_control_step() -> None:
     one, two = hovering(), hovering()
     for vehicle in (one, two):
-        vehicle.commander.reposition(3.0, 0.0, -5.0)
+        vehicle.commander.guided.reposition((3.0, 0.0, -5.0))
         vehicle.advance(vehicle.now_us + 1_000_000)
     assert one.snapshot().truth == two.snapshot().truth
     two.parameters.set("RATE_Y_P", 1.0)
@@ -80,7 +80,7 @@ def test_a_new_gain_acts_at_the_very_next_control_step() -> None:
 @pytest.mark.parametrize("error", [0, 1])
 def test_both_attitude_errors_fly_at_heading_zero(error: int) -> None:
     vehicle = hovering(overrides={"SYS_ATT_ERROR": error})
-    vehicle.commander.reposition(4.0, -3.0, -6.0)
+    vehicle.commander.guided.reposition((4.0, -3.0, -6.0))
     vehicle.advance(vehicle.now_us + 12_000_000)
     assert position(vehicle.snapshot()) == pytest.approx((4.0, -3.0, -6.0), abs=0.05)
 
@@ -90,7 +90,7 @@ def test_a_full_turn_in_hover_stays_in_place(name: str) -> None:
     vehicle = hovering(name)
     worst = 0.0
     for degrees in (90.0, 180.0, 270.0, 360.0):
-        vehicle.commander.reposition(None, None, None, math.radians(degrees))
+        vehicle.commander.guided.reposition((NAN, NAN, NAN), math.radians(degrees))
         trace = traced(vehicle, 6.0)
         worst = max(worst, np.abs(trace[:, 1:4] - (0.0, 0.0, -5.0)).max())
         s = vehicle.snapshot().nav
@@ -101,7 +101,7 @@ def test_a_full_turn_in_hover_stays_in_place(name: str) -> None:
 
 def test_it_starts_at_any_heading_and_flies_in_world_axes() -> None:
     vehicle = hovering(heading_rad=math.radians(120.0))
-    vehicle.commander.reposition(3.0, 2.0, -4.0)
+    vehicle.commander.guided.reposition((3.0, 2.0, -4.0))
     vehicle.advance(vehicle.now_us + 10_000_000)
     s = vehicle.snapshot()
     assert position(s) == pytest.approx((3.0, 2.0, -4.0), abs=0.05)

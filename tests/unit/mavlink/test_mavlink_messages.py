@@ -14,6 +14,8 @@ from sitl.mavlink.streams import STREAMS
 from sitl.mavlink.view import Craft, View
 from sitl.model.rigid_body import State
 from sitl.navigation import NavState
+from sitl.onboard.circles import Circle
+from sitl.onboard.guided import Orbiting
 from sitl.onboard.mission import MissionState
 from sitl.onboard.modes import Landed, Mode
 from sitl.snapshot import Battery, Snapshot
@@ -215,7 +217,8 @@ def test_the_intended_mode_is_unknown_in_a_failsafe() -> None:
 
 def test_every_stream_can_be_packed_from_any_finite_state() -> None:
     wild = NAV._replace(north_m=-8e6, down_m=5e5, v_north_m_s=1e4, v_down_m_s=-1e4)
-    for snapshot in (SNAPSHOT, SNAPSHOT._replace(nav=wild)):
+    orbiting = Orbiting(Circle((5.0, 6.0, -7.0), 3.0), clockwise=False)
+    for snapshot in (SNAPSHOT._replace(orbiting=orbiting), SNAPSHOT._replace(nav=wild, orbiting=orbiting)):
         view = View(snapshot, CRAFT)
         for stream in STREAMS:
             assert stream.payload(view), stream.definition.name

@@ -4,9 +4,10 @@ import math
 from collections.abc import Callable
 
 from sitl.onboard.events import EventLog
-from sitl.onboard.mission import Frame, ItemCommand, MissionItem
+from sitl.onboard.mission_items import ItemCommand
 from sitl.onboard.modes import Event, EventKind, Mode
 from sitl.onboard.offboard import OffboardTarget
+from sitl.onboard.plan import Frame, MissionItem
 from sitl.onboard.store import MemoryStore
 from sitl.vehicle import Vehicle, load_vehicle
 

@@ -8,9 +8,10 @@ from onboard_flights import NAN, SPECS, after, hovering, item, of_kind, place, r
 
 from sitl.frames import heading
 from sitl.geodesy import to_global
-from sitl.onboard.mission import Frame, MissionItem, MissionState
-from sitl.onboard.mission import ItemCommand as C
+from sitl.onboard.mission import MissionState
+from sitl.onboard.mission_items import ItemCommand as C
 from sitl.onboard.modes import EventKind, Landed, Mode
+from sitl.onboard.plan import Frame, MissionItem
 from sitl.vehicle import Vehicle
 
 UP = (0.0, 0.0, -3.0)
@@ -258,7 +259,7 @@ def test_items_that_only_concern_others_are_passed_at_once() -> None:
         item(C.DO_LAND_START),
         item(C.DO_SET_ROI_NONE),
         item(C.DO_SET_ROI),
-        item(C.DO_SET_ROI_LOCATION),
+        item(C.DO_SET_ROI_LOCATION, UP),
         item(C.DO_VTOL_TRANSITION, p1=3.0),
         item(C.VTOL_TAKEOFF, UP),
         item(C.VTOL_LAND, UP),

@@ -7,6 +7,7 @@ from sitl.control.reference import Reference
 from sitl.frames import standing
 from sitl.navigation import NavState
 from sitl.onboard.ground import Contact, Intent, Tilt, contact, tilt
+from sitl.onboard.guide import Fix
 from sitl.onboard.modes import Landed
 
 UPRIGHT, LYING = standing(0.3, 1.5708), standing(0.3, 0.1)
@@ -25,39 +26,39 @@ def reference(down_m: float = 0.0, v_down_m_s: float = 0.0, a_down_m_s2: float =
 
 @pytest.mark.parametrize("r", [reference(-0.05), reference(0.0, -0.01)])
 def test_a_standing_vehicle_flies_once_the_reference_leaves_the_ground(r: Reference) -> None:
-    assert contact(STANDING, 0, nav(), 4, r, JUST_FLYING) == FLYING
-    assert contact(STANDING, 0, nav(), 4, r, TAKING_OFF).landed is Landed.TAKING_OFF
-    assert contact(STANDING, 0, nav(), 4, r, LANDING).effort is Effort.IDLE
+    assert contact(STANDING, Fix(0, nav(), 4), r, JUST_FLYING) == FLYING
+    assert contact(STANDING, Fix(0, nav(), 4), r, TAKING_OFF).landed is Landed.TAKING_OFF
+    assert contact(STANDING, Fix(0, nav(), 4), r, LANDING).effort is Effort.IDLE
 
 
 def test_a_reference_that_has_come_down_and_still_brakes_leaves_the_vehicle_standing() -> None:
-    assert contact(STANDING, 0, nav(), 4, reference(0.01, 0.05, -0.2), JUST_FLYING).standing
+    assert contact(STANDING, Fix(0, nav(), 4), reference(0.01, 0.05, -0.2), JUST_FLYING).standing
 
 
 @pytest.mark.parametrize("error_m", [-0.02, 0.02])
 def test_an_error_of_the_height_estimate_lifts_nothing_off(error_m: float) -> None:
-    assert contact(STANDING, 0, nav(error_m), 4, reference(), JUST_FLYING).standing
+    assert contact(STANDING, Fix(0, nav(error_m), 4), reference(), JUST_FLYING).standing
 
 
 def test_a_flying_vehicle_stands_when_the_reference_and_the_feet_are_down_and_it_is_calm() -> None:
     r = reference(0.1, 0.3)
-    assert contact(FLYING, 7, nav(), 2, r, LANDING) == Contact(Effort.IDLE, Landed.ON_GROUND, 7)
-    assert not contact(FLYING, 7, nav(v_down_m_s=0.5), 2, r, LANDING).standing
-    assert not contact(FLYING, 7, nav(), 2, reference(-0.3), LANDING).standing
-    assert not contact(FLYING, 7, nav(), 2, reference(0.1, -0.3), LANDING).standing
+    assert contact(FLYING, Fix(7, nav(), 2), r, LANDING) == Contact(Effort.IDLE, Landed.ON_GROUND, 7)
+    assert not contact(FLYING, Fix(7, nav(v_down_m_s=0.5), 2), r, LANDING).standing
+    assert not contact(FLYING, Fix(7, nav(), 2), reference(-0.3), LANDING).standing
+    assert not contact(FLYING, Fix(7, nav(), 2), reference(0.1, -0.3), LANDING).standing
 
 
 def test_a_reference_that_rests_on_the_ground_lets_down_a_vehicle_just_above_it() -> None:
-    c = contact(FLYING, 0, nav(-0.03), 0, reference(), JUST_FLYING)
+    c = contact(FLYING, Fix(0, nav(-0.03), 0), reference(), JUST_FLYING)
     assert not c.standing
-    assert not contact(c, 300_000, nav(-0.03), 0, reference(), JUST_FLYING).standing
-    assert contact(c, 450_000, nav(-0.03), 0, reference(), JUST_FLYING).standing
-    assert not contact(c, 450_000, nav(-0.1), 0, reference(), JUST_FLYING).standing
+    assert not contact(c, Fix(300_000, nav(-0.03), 0), reference(), JUST_FLYING).standing
+    assert contact(c, Fix(450_000, nav(-0.03), 0), reference(), JUST_FLYING).standing
+    assert not contact(c, Fix(450_000, nav(-0.1), 0), reference(), JUST_FLYING).standing
 
 
 def test_the_time_on_the_ground_counts_from_touch_down() -> None:
-    c = contact(STANDING, 1_000_000, nav(), 4, reference(), JUST_FLYING)
-    c = contact(c, 3_500_000, nav(), 4, reference(), JUST_FLYING)
+    c = contact(STANDING, Fix(1_000_000, nav(), 4), reference(), JUST_FLYING)
+    c = contact(c, Fix(3_500_000, nav(), 4), reference(), JUST_FLYING)
     assert c.standing_s(3_500_000) == pytest.approx(2.5)
 
 

@@ -6,8 +6,10 @@ import pytest
 from onboard_flights import NAN, FailingStore, item, texts
 
 from sitl.onboard.events import EventLog
-from sitl.onboard.mission import CAPACITY, Fault, Frame, ItemCommand, Mission, MissionItem, MissionState
+from sitl.onboard.mission import Mission, MissionState
+from sitl.onboard.mission_items import ItemCommand
 from sitl.onboard.modes import EventKind, Verdict
+from sitl.onboard.plan import CAPACITY, Fault, Frame, MissionItem
 from sitl.onboard.store import FolderStore, MemoryStore, Store
 
 C = ItemCommand
@@ -121,7 +123,7 @@ def test_a_plan_that_cannot_be_saved_is_a_fault_and_so_is_clearing() -> None:
     assert m.replace(PLAN[:1]) == Fault(0, "total", "not saved: No space left on device")
     assert m.clear() == Fault(0, "total", "not saved: No space left on device")
     assert m.items == PLAN
-    assert [e.value for e in events.since(0) if e.kind is EventKind.MISSION] == [4]
+    assert [e.value for e in events.since(0) if e.kind is EventKind.PLAN] == [4]
 
 
 @pytest.mark.parametrize(

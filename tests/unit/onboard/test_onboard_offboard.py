@@ -19,7 +19,7 @@ NOTHING = (NAN, NAN, NAN)
 
 
 def offboard() -> Offboard:
-    return Offboard(standing().parameters)
+    return Offboard(standing().parameters, lambda point_N, what: "", 40.0, 12.0)
 
 
 def in_offboard(first: OffboardTarget = HERE) -> Vehicle:
@@ -67,17 +67,13 @@ def test_no_target_whatever_its_numbers_raises_or_makes_a_reference_that_is_not_
 OFFBOARD = offboard()
 
 
-def test_a_stream_counts_once_it_has_lasted_a_second_above_two_hertz() -> None:
+def test_one_target_younger_than_the_loss_time_opens_offboard_and_silence_bars_it() -> None:
     o = offboard()
-    for k in range(5):
-        o.submit(HERE, k * 200_000)
-        assert not o.streaming(k * 200_000)
-    assert o.streaming(1_000_000)
-    assert not o.streaming(1_600_000)
-    slow = offboard()
-    for k in range(10):
-        slow.submit(HERE, k * 600_000)
-    assert not slow.streaming(9 * 600_000)
+    assert o.lost(0)
+    o.submit(HERE, 1_000_000)
+    assert not o.lost(1_000_000)
+    assert not o.lost(1_500_000)
+    assert o.lost(1_500_001)
 
 
 def test_a_target_is_carried_forward_by_its_age() -> None:

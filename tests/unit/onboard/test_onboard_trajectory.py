@@ -8,7 +8,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from sitl.control.reference import Trajectory, sample
-from sitl.onboard.trajectory import Limits, Motion, at, circle, heading_to, plan, stopping, to_point
+from sitl.onboard.circles import Circle, turns_at_rest
+from sitl.onboard.trajectory import Limits, Motion, at, heading_to, plan, stopping, to_point
 
 LIMITS = Limits(3.0, 2.0, 1.0, 1.2, 2.0, 1.0, 4.0, math.radians(45.0))
 REST = Motion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
@@ -128,7 +129,7 @@ def test_the_onboard_logic_and_the_cascade_see_the_same_reference(
 
 
 def test_a_circle_of_many_pieces_reads_the_same_to_the_cascade() -> None:
-    path = circle(1.0, (0.0, 0.0, -3.0), 2.0, 0.3, 3.0, 0.0, LIMITS)
+    path = turns_at_rest(1.0, Circle((0.0, 0.0, -3.0), 2.0), 0.3, 3.0, 0.0, LIMITS)
     for t in (0.0, 1.0, float(path.start_s[7]), 17.123, path.end_s, path.end_s + 1.0):
         assert tuple(at(path, t)) == pytest.approx(tuple(sample(path, t)), abs=1e-9)
 
@@ -177,7 +178,7 @@ def test_headings_of_many_turns_are_wrapped_to_the_short_way() -> None:
 
 
 def test_a_circle_keeps_its_radius_and_the_limits() -> None:
-    path = circle(0.0, (1.0, 2.0, -3.0), 2.0, 0.5, -2.0, 0.3, LIMITS)
+    path = turns_at_rest(0.0, Circle((1.0, 2.0, -3.0), 2.0), 0.5, -2.0, 0.3, LIMITS)
     x, found = sampled(path, 2000), peaks(path)
     assert np.hypot(x[:, 0] - 1.0, x[:, 1] - 2.0) == pytest.approx(2.0, abs=1e-4)
     assert found["speed"] <= 3.0
