@@ -8,6 +8,15 @@ import yaml
 
 from conformance.observation import UNSUPPORTED, Observation
 
+CLIENTS: dict[str, str | None] = {
+    "QGroundControl": None,  # a script after its sources: see tests/e2e/test_client_qgroundcontrol.py
+    "MAVSDK 3": "mavsdk-grpc",
+    "MAVSDK 4": "mavsdk",
+    "MAVProxy": "MAVProxy",
+    "pymavlink": "pymavlink",
+}
+"""By name: the package that it comes in."""
+
 PATH = Path(__file__).with_name("clients.yaml")
 WRITE = "CONFORMANCE_WRITE"  # environment variable: take what is seen down instead of comparing
 

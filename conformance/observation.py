@@ -59,7 +59,6 @@ class Observation(msgspec.Struct, frozen=True):
     or at a rate, and the results.
     """
 
-    version: str
     messages: dict[str, bool] = {}
     commands: dict[str, list[str]] = {}
     requests: dict[str, list[str]] = {}
@@ -77,7 +76,7 @@ def frames(tlog: Path) -> Iterator[Frame]:
         place += total + 8
 
 
-def observe(version: str, recording: Iterator[Frame], vehicle: int) -> Observation:
+def observe(recording: Iterator[Frame], vehicle: int) -> Observation:
     """Reduce a recording of the system `vehicle` and one client."""
     sent: set[str] = set()
     heard: set[str] = set()
@@ -96,7 +95,7 @@ def observe(version: str, recording: Iterator[Frame], vehicle: int) -> Observati
                 kind.setdefault(what, set()).add(_result_name(m.result))
     messages = {name: not (answers := ANSWERS.get(name)) or not heard.isdisjoint(answers) for name in sorted(sent)}
     commands, requests, rates = ({what: sorted(kind[what]) for what in sorted(kind)} for kind in results)
-    return Observation(version, messages, commands, requests, rates)
+    return Observation(messages, commands, requests, rates)
 
 
 def _kind(results: tuple[dict[str, set[str]], ...], m: object) -> tuple[dict[str, set[str]], str]:

@@ -12,6 +12,7 @@ from pathlib import Path
 from daemon_process import Daemon
 
 ANSWER_S = 30.0
+REPEAT_S = 6.0
 STANDARD_MODULES = (
     *("adsb", "arm", "auxopt", "battery", "calibration", "cmdlong", "fence", "ftp", "layout", "link", "log", "misc"),
     *("mode", "output", "param", "rally", "rc", "relay", "signing", "terrain", "tuneopt", "wp"),
@@ -25,7 +26,7 @@ class MavProxy:
         program = Path(sysconfig.get_path("scripts")) / "mavproxy.py"
         master = f"udpout:127.0.0.1:{18570 + daemon.instance}"
         self._process = subprocess.Popen(
-            [sys.executable, str(program), "--master", master, "--no-state", "--nowait"],
+            [sys.executable, str(program), "--master", master, "--no-state", "--nowait", "--streamrate", "2"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -53,27 +54,30 @@ class MavProxy:
         """Everything so far."""
         return self._said
 
-    def command(self, line: str, *answers: str) -> "re.Match[str]":
-        """Type a line; the last of the answers, regular expressions that are to come one after the other."""
+    def type(self, line: str) -> None:
+        """A line, whatever comes of it."""
         assert self._process.stdin is not None
         with self._news:
             self._read = len(self._said)
         self._process.stdin.write(line + "\n")
-        found = None
-        for answer in answers:
-            found = self.hear(answer)
-        return found
 
-    def until(self, line: str, pattern: str) -> "re.Match[str]":
-        """Type a line again and again, until the answer fits."""
+    def command(self, line: str, answer: str, *events: str) -> "re.Match[str]":
+        """Type a line, again if the answer stays away: datagrams get lost on a busy machine. Then wait for the events.
+
+        Answer and events are regular expressions; returns the last one's match.
+        """
         end_s = time.monotonic() + ANSWER_S
         while True:
-            self.command(line)
+            self.type(line)
             try:
-                return self.hear(pattern, 1.0)
+                found = self.hear(answer, REPEAT_S)
+                break
             except AssertionError:
                 if time.monotonic() > end_s:
                     raise
+        for event in events:
+            found = self.hear(event)
+        return found
 
     def hear(self, pattern: str, limit_s: float = ANSWER_S) -> "re.Match[str]":
         """What fits first in what it says from here on."""

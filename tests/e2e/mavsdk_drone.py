@@ -35,10 +35,6 @@ class Generation(Enum):
     GRPC = "MAVSDK 3"
     NATIVE = "MAVSDK 4"
 
-    @property
-    def package(self) -> str:
-        return "mavsdk-grpc" if self is Generation.GRPC else "mavsdk"
-
 
 class Drone:
     """One connected vehicle: the plugins as attributes, their types in `types`, streams by name."""

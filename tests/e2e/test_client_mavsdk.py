@@ -24,7 +24,7 @@ def drone(request, tmp_path_factory) -> Iterator[tuple[asyncio.Runner, Drone]]:
     """
     generation, folder = request.param, tmp_path_factory.mktemp("mavsdk")
     own = ("--speed", str(SPEED), "--set", "COM_OF_LOSS_T=20")
-    with recorded(generation.value, generation.package, folder, *own) as daemon, asyncio.Runner() as runner:
+    with recorded(generation.value, folder, *own) as daemon, asyncio.Runner() as runner:
         connection = Drone.connected(generation, f"udpout://127.0.0.1:{14580 + daemon.instance}")
         yield runner, runner.run(connection.__aenter__())
         runner.run(connection.__aexit__(None, None, None))
