@@ -115,6 +115,7 @@ class Loop:
         """One turn at `wall_s`; returns the wall time of the next."""
         vehicle = self._vehicle
         self.turns += 1
+        self._sockets.pardon(wall_s)
         self._receive(wall_s)
         self._follow_parameters(wall_s)
         due_us = self.pacing.due_us(vehicle.now_us, wall_s)
@@ -150,6 +151,7 @@ class Loop:
             datagrams_out=self._sockets.sent,
             datagrams_dropped=self._sockets.dropped,
             datagrams_refused=e.refused,
+            senders_shunned=self._sockets.shunned,
             datagrams_unreadable=e.unreadable,
             frames_unauthentic=e.unauthentic,
             frames_forwarded=e.forwarded,
@@ -192,7 +194,8 @@ class Loop:
     def _receive(self, wall_s: float) -> None:
         for port, address, data in self._sockets.receive():
             try:
-                self._endpoint.receive(data, address, _KINDS[port], wall_s)
+                if not self._endpoint.receive(data, address, _KINDS[port], wall_s):
+                    self._sockets.refused(port, address, wall_s)
             except Exception:
                 self._complain(f"a datagram of {len(data)} bytes from {address[0]}:{address[1]}", wall_s)
 

@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterator, Mapping
 
 from sitl.daemon.config import Address, Port, SettingError
+from sitl.daemon.shunning import Shunning
 
 DATAGRAMS_AT_ONCE = 256  # per socket; the loop looks at its deadline before it takes more
 _BUFFER_BYTES = 1 << 20
@@ -21,6 +22,7 @@ class Sockets:
         self.received = 0
         self.sent = 0
         self.dropped = 0  # datagrams that the system would not take
+        self._shunning = Shunning()
         self._sockets: dict[Port, socket.socket] = {}
         try:
             for port, address in addresses.items():
@@ -51,6 +53,19 @@ class Sockets:
                 self.received += 1
                 yield port, address, data
 
+    @property
+    def shunned(self) -> int:
+        """How often a flooding address has been shut out."""
+        return self._shunning.shunned
+
+    def refused(self, port: Port, address: Address, wall_s: float) -> None:
+        """A datagram was more than its sender may send: too many of these, and the system drops the rest."""
+        self._shunning.refused(self._sockets[port], port, address, wall_s)
+
+    def pardon(self, wall_s: float) -> None:
+        """Listen again to those that were shut out long enough."""
+        self._shunning.pardon(wall_s)
+
     def send(self, port: Port, address: Address, data: bytes) -> None:
         """Hand a datagram to the system; one that it refuses is counted and forgotten, as on any UDP link."""
         try:
@@ -60,6 +75,7 @@ class Sockets:
             self.dropped += 1
 
     def close(self) -> None:
+        self._shunning.close()
         for sock in self._sockets.values():
             with contextlib.suppress(OSError):
                 sock.close()

@@ -141,15 +141,15 @@ class Endpoint:
 
     # --- in
 
-    def receive(self, data: bytes, address: Address, kind: PortKind, wall_s: float) -> None:
-        """Take a datagram. Never raises, whatever the bytes."""
+    def receive(self, data: bytes, address: Address, kind: PortKind, wall_s: float) -> bool:
+        """Take a datagram. Never raises, whatever the bytes. False: it was more than its sender may send."""
         link = self._link
         link.wall_s = wall_s
         peer = link.peers.find(kind, address)
         allowance = peer.allowance if peer is not None else self._strangers
         if not allowance.take(wall_s):
             self.refused += 1
-            return
+            return False
         parser = peer.parser if peer is not None else Parser()
         frames = parser.feed(data)
         allowance.charge(cost(data, len(frames)) - 1)
@@ -165,7 +165,7 @@ class Endpoint:
                 peer = link.peers.learn(kind, address, wall_s, self._vehicle.now_us)
                 if peer is None:
                     self.refused += 1
-                    return
+                    return False
                 peer.parser = parser
                 self._stream_due_us = 0
             if peer.hear(frame.version, wall_s):
@@ -179,6 +179,7 @@ class Endpoint:
             except Exception:
                 self.faults += 1
                 log.exception("handling %s failed", frame.name)
+        return True
 
     def _is_authentic(self, signer: Signer, frame: Frame) -> bool:
         signer.keep_time(self._link.wall_s)

@@ -172,6 +172,7 @@ class LoopMessage(msgspec.Struct, frozen=True, gc=False):
     datagrams_out: int
     datagrams_dropped: int
     datagrams_refused: int
+    senders_shunned: int
     datagrams_unreadable: int
     frames_unauthentic: int
     frames_forwarded: int

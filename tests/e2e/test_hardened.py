@@ -27,7 +27,7 @@ def test_a_flood_from_one_address_leaves_others_their_heartbeats_and_answers(tmp
     assert len(seen.beats_s) >= 2
     assert max(seen.beats_s) < 2.5  # 1.0 on an idle machine: benchmarks measure it
     assert seen.answered >= seen.asked - 1
-    assert re.search(r"\d{4,} datagrams refused", daemon.log)
+    assert re.search(r"\d{3,} datagrams refused", daemon.log)
 
 
 @pytest.fixture

@@ -68,13 +68,14 @@ class Link:
         self._craft = craft
         self._replies: list = []
 
-    def receive(self, data, address, kind, wall_s) -> None:
+    def receive(self, data, address, kind, wall_s) -> bool:
         if data == b"poison":
             raise ValueError("poisoned")
         self.shutdown_requested |= data == b"shut down"
         self.reboot_requested |= data == b"reboot"
         self.received.append((data, address, kind, wall_s))
         self._replies.append((kind, address, b"re: " + data))
+        return data != b"too much"
 
     def poll(self, wall_s):
         self.polled.append((wall_s, self._craft.now_us))
@@ -85,11 +86,12 @@ class Link:
 class Wire:
     """Sockets on which datagrams arrive when the script says; waiting moves the clock."""
 
-    received = sent = dropped = 0
+    received = sent = dropped = shunned = 0
 
     def __init__(self, clock: Clock) -> None:
         self.script: list = []  # (wall time, port, data)
         self.outgoing: list = []
+        self.refusals: list = []
         self._clock = clock
 
     def receive(self):
@@ -104,6 +106,12 @@ class Wire:
             return True
         self._clock.now_s = end_s
         return False
+
+    def refused(self, port, address, wall_s) -> None:
+        self.refusals.append((port, address))
+
+    def pardon(self, wall_s) -> None:
+        pass
 
     def rest(self, seconds: float) -> None:
         self._clock.now_s += max(0.0, seconds)
@@ -170,6 +178,12 @@ def test_a_flood_wakes_the_loop_so_often_and_then_waits_for_the_turn(bench) -> N
     assert len(bench.link.received) == pytest.approx(50_000, abs=300)
     assert len(bench.link.polled) <= (1.0 / TURN_S + 2) * (WAKES_MAX + 1)
     assert bench.loop.lateness.turns == pytest.approx(1.0 / TURN_S, abs=2)
+
+
+def test_what_the_link_refuses_is_told_to_the_sockets(bench) -> None:
+    bench.wire.script = [(bench.clock() + 0.1, Port.GCS, data) for data in (b"fine", b"too much")]
+    bench.run(0.5)
+    assert bench.wire.refusals == [(Port.GCS, CLIENT)]
 
 
 def test_a_datagram_that_breaks_the_link_is_counted_and_survived(bench, caplog) -> None:

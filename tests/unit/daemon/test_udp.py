@@ -1,10 +1,12 @@
 """The sockets, on ports that the system picks."""
 
 import socket
+import sys
 
 import pytest
 
 from sitl.daemon.config import Port, SettingError
+from sitl.daemon.shunning import ADDRESSES_MAX, REFUSALS, SHUN_S
 from sitl.daemon.udp import DATAGRAMS_AT_ONCE, Sockets
 
 
@@ -75,3 +77,49 @@ def test_a_port_in_use_is_named_with_the_way_out(sockets) -> None:
 def test_an_address_that_is_not_this_machine_s_is_refused_in_one_line() -> None:
     with pytest.raises(SettingError, match=r"can't listen on 192\.0\.2\.1"):
         Sockets({Port.GCS: ("192.0.2.1", free_port())}, 0)
+
+
+def refuse(sockets, address, wall_s) -> None:
+    for _ in range(REFUSALS):
+        sockets.refused(Port.GCS, address, wall_s)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the system has to sort datagrams by sender")
+def test_a_flooding_address_is_shut_out_for_a_while_and_nobody_else_is(sockets, client) -> None:
+    port = sockets.ports[Port.GCS]
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as flooder:
+        flooder.bind(("127.0.0.1", 0))
+        refuse(sockets, flooder.getsockname(), 100.0)
+        for _ in range(10):
+            flooder.sendto(b"flood", port)
+            client.sendto(b"request", port)
+        assert [data for _, _, data in sockets.receive()] == [b"request"] * 10
+        sockets.send(Port.GCS, flooder.getsockname(), b"still served")
+        assert flooder.recv(100) == b"still served"
+        sockets.pardon(100.0 + SHUN_S - 0.1)
+        flooder.sendto(b"flood", port)
+        assert list(sockets.receive()) == []
+        sockets.pardon(100.0 + SHUN_S)
+        flooder.sendto(b"again", port)
+        assert [data for _, _, data in sockets.receive()] == [b"again"]
+    assert sockets.shunned == 1
+
+
+def test_a_few_refusals_a_second_shut_nobody_out(sockets, client) -> None:
+    for k in range(10 * REFUSALS):
+        sockets.refused(Port.GCS, client.getsockname(), 100.0 + k * 2.5 / REFUSALS)
+    assert sockets.shunned == 0
+
+
+def test_while_one_is_shut_out_the_port_is_still_nobody_elses(sockets) -> None:
+    refuse(sockets, ("127.0.0.1", 9), 100.0)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        with pytest.raises(OSError, match="in use"):
+            other.bind(sockets.ports[Port.GCS])
+
+
+def test_addresses_shut_out_are_bounded(sockets) -> None:
+    for k in range(1, 200):
+        refuse(sockets, ("127.0.0.1", k), 100.0)
+    assert sockets.shunned <= ADDRESSES_MAX
