@@ -39,8 +39,15 @@ def measure(quick: bool) -> Iterator[Figure]:
         with running(start("gcs_tools", *watch)), listener(zenoh_endpoint(instance), "read"):
             time.sleep(1.0)
             shares = [_share(process.pid) for _ in range(WINDOWS)]
+    with daemon(instance, "--record") as process:
+        converse(ground(instance), instance + 1, lambda client: commands.takeoff(client, height_m=3.0, wait=True))
+        [writer] = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+        recording = [_share(process.pid) for _ in range(WINDOWS)]
+        writing = [_share(int(writer)) for _ in range(WINDOWS)]
     yield at_most("CPU at 1 ×, a ground station and a Zenoh subscriber", shares, 20.0, "% of a core")
     yield told("  before either was there", spread(alone, "% of a core"))
+    yield told("  the same, recording", spread(recording, "% of a core"))
+    yield told("  the process that writes the recording", spread(writing, "% of a core"))
 
 
 def _share(pid: int) -> float:

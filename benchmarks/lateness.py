@@ -21,6 +21,7 @@ from sitl.daemon.clock import TURN_S, Lateness
 from sitl.daemon.config import RunConfig
 from sitl.daemon.loop import Loop
 from sitl.daemon.main import wall_clock
+from sitl.daemon.recorder import Recorder
 from sitl.daemon.udp import Sockets
 
 SEGMENT_S = 4.0
@@ -61,6 +62,10 @@ def measure(quick: bool) -> Iterator[Figure]:
                 process.send_signal(signal.SIGSTOP)
                 yield from _beside(loop, "and a subscriber that is stopped")
         figures = loop.figures()
+    with _assembled(config._replace(record=True)) as loop:
+        watch = ("watch", "--connect", ground(config.instance), "--system", str(config.system_id))
+        with running(start("gcs_tools", *watch)):
+            yield from _beside(loop, "with a ground station, recording the flight", subscribed=False)
     yield told(
         "  telemetry in all of it",
         f"{figures.telemetry_messages} messages, longest turn {figures.telemetry_worst_ms:.2f} ms, "
@@ -81,7 +86,11 @@ def _assembled(config: RunConfig) -> Iterator[Loop]:
         assert publisher is not None
         stack.callback(publisher.close)
         vehicle = assembly.build_vehicle(config)
-        loop, _ = assembly.build_loop(config, vehicle, sockets, publisher, None, clock)
+        recorder = None
+        if config.record:
+            recorder = Recorder(config.log_dir, config.instance)
+            stack.callback(recorder.close)
+        loop, _ = assembly.build_loop(config, vehicle, sockets, publisher, recorder, clock)
         vehicle.advance(100_000)
         vehicle.commander.takeoff()
         vehicle.commander.arm()

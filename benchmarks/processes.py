@@ -5,11 +5,12 @@ import socket
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
 from gcs_tools.client import Client, Script
+from gcs_tools.impairment import GOOD, Impairment
 from gcs_tools.link import UdpLink, parse_connection
 
 T = TypeVar("T")
@@ -85,9 +86,12 @@ def running(process: subprocess.Popen[str]) -> Iterator[subprocess.Popen[str]]:
 
 
 @contextlib.contextmanager
-def daemon(instance: int, *options: str) -> Iterator[subprocess.Popen[str]]:
-    """`sitl run` with a state folder of its own."""
+def daemon(instance: int, *options: str, logs: Mapping[str, bytes] | None = None) -> Iterator[subprocess.Popen[str]]:
+    """`sitl run` with a state folder of its own, in which there are `logs`."""
     with tempfile.TemporaryDirectory(prefix="yawsitter-benchmark-") as state:
+        for name, data in (logs or {}).items():
+            (Path(state) / "logs").mkdir(exist_ok=True)
+            (Path(state) / "logs" / name).write_bytes(data)
         arguments = ("run", "--instance", str(instance), "--state-dir", state, *options)
         with running(start("sitl", *arguments)) as process:
             yield process
@@ -103,10 +107,10 @@ def ground(instance: int) -> str:
     return f"udpout:127.0.0.1:{LOCAL_GCS + instance}"
 
 
-def converse(connection: str, system: int, talk: Callable[[Client], Script[T]]) -> T:
+def converse(connection: str, system: int, talk: Callable[[Client], Script[T]], impairment: Impairment = GOOD) -> T:
     """Run a script over UDP once the vehicle is heard, and return its result. Raises LinkError."""
     client = Client(system)
-    with UdpLink(parse_connection(connection)) as link:
+    with UdpLink(parse_connection(connection), impairment) as link:
         client.start(_connected(client, talk))
         link.run(client)
     result: T = client.result

@@ -1,14 +1,18 @@
-"""Transfers over UDP on loopback: the whole parameter list, and a mission of 500 items up and down, verbatim."""
+"""Transfers over UDP on loopback: the whole parameter list, over a bad link too; a mission of 500 items up and down,
+verbatim; a log of a megabyte over MAVLink FTP and over LOG_*, checked byte for byte.
+"""
 
 import math
 import random
 from collections.abc import Iterator
 from typing import Any
 
-from benchmarks.figure import Figure, at_most, spread, told
+from benchmarks.figure import Figure, at_least, at_most, spread, told
 from benchmarks.processes import BenchmarkError, converse, daemon, free_instance, onboard
-from gcs_tools import params
+from gcs_tools import logs, params
 from gcs_tools.client import Client, Script
+from gcs_tools.ftp import Ftp
+from gcs_tools.impairment import Impairment
 from gcs_tools.link import now_s
 from gcs_tools.plan import Item
 from gcs_tools.upload import upload
@@ -18,18 +22,58 @@ from sitl.mavlink.wire import float32
 
 RUNS = 5
 ITEMS = 500
+LOG_BYTES = 1_000_000
+SEEDS = (1, 2, 3)  # of the bad link
 _RETRY_S, _GIVE_UP_S = 0.5, 20.0
 _GLOBAL, _RELATIVE, _LOCAL = 5, 6, 1  # MAV_FRAME
 
 
 def measure(quick: bool) -> Iterator[Figure]:
     instance = free_instance()
-    with daemon(instance, "--no-zenoh"):
+    log = random.Random(1).randbytes(LOG_BYTES)
+    with daemon(instance, "--no-zenoh", logs={"flight.tlog": log}):
         listed, count, written, up, down = converse(onboard(instance), instance + 1, _talk)
-    yield at_most(f"parameter list, {count} values over UDP", listed, 0.5, "s")
+        lossy = [
+            converse(onboard(instance), instance + 1, _list_all, Impairment(0.2, 0.05, 0.1, seed)) for seed in SEEDS
+        ]
+        by_ftp, by_log = converse(onboard(instance), instance + 1, lambda client: _read_log(client, log))
+    yield at_most(f"parameter list, {count} values over UDP", listed, 0.3, "s")
+    if any(n != count for n, _ in lossy):
+        raise BenchmarkError(f"not all of {count} parameters came over the bad link")
+    yield told("  complete with 20 % lost, 5 % doubled, 100 ms jitter", spread([took for _, took in lossy], "s"))
     yield told("  one value written and answered", spread([1e3 * t for t in written], "ms"))
     yield at_most(f"mission of {ITEMS} items up over UDP", up, 2.0, "s")
     yield at_most(f"mission of {ITEMS} items down, verbatim", down, 2.0, "s")
+    yield at_least("log of 1 MB in bursts over MAVLink FTP", [LOG_BYTES / t * 1e-6 for t in by_ftp], 2.0, "MB/s")
+    yield told("  the same over LOG_*", spread([LOG_BYTES / t * 1e-6 for t in by_log], "MB/s"))
+
+
+def _list_all(client: Client) -> Script[tuple[int, float]]:
+    begun_s = now_s()
+    found = yield from params.fetch_all(client)
+    return len(found), now_s() - begun_s
+
+
+def _read_log(client: Client, log: bytes) -> Script[tuple[list[float], list[float]]]:
+    """Seconds that it took each way."""
+    ways: dict[str, list[float]] = {"ftp": [], "log": []}
+    for _ in range(RUNS):
+        for way, took in ways.items():
+            got = bytearray(len(log))
+
+            def place(offset: int, data: bytes, got: bytearray = got) -> None:
+                got[offset : offset + len(data)] = data
+
+            begun_s = now_s()
+            if way == "ftp":
+                with Ftp(client) as ftp:
+                    yield from ftp.read("/logs/flight.tlog", place)
+            else:
+                yield from logs.pieces(client, logs.Log(0, None, len(log)), place)
+            took.append(now_s() - begun_s)
+            if got != log:
+                raise BenchmarkError("the log came other than it is")
+    return ways["ftp"], ways["log"]
 
 
 def _talk(client: Client) -> Script[tuple[list[float], int, list[float], list[float], list[float]]]:

@@ -17,6 +17,7 @@ from sitl.mavlink.ftp_payload import crc32
 FOLDER = "/logs"
 _PIECE = 90  # bytes of a LOG_DATA
 _QUIET_S = 0.3
+_SPAN = 200 * _PIECE
 _CHECKED_AT_ONCE = 1 << 20
 _KINDS = {b"\x89MCAP0\r\n": "mcap"}  # by the first bytes; a .tlog begins with a time
 
@@ -148,14 +149,18 @@ def _numbered(client: Client) -> Script[list[Log]]:
 
 def _fetch_numbered(client: Client, log: Log, folder: Path, show: Show) -> Script[Path]:
     part = folder / f"log-{log.number}.part"
-    yield from _into(part, lambda place, start, seen: _pieces(client, log, place, start, seen), log, show)
+    yield from _into(part, lambda place, start, seen: pieces(client, log, place, start, seen), log, show)
     with part.open("rb") as file:
         kind = _KINDS.get(file.read(8), "tlog")
     return part.replace(folder / f"log-{log.number}.{kind}")
 
 
-def _pieces(
-    client: Client, log: Log, place: Callable[[int, bytes], None], start: int, seen: Callable[[Blocks], None]
+def pieces(
+    client: Client,
+    log: Log,
+    place: Callable[[int, bytes], None],
+    start: int = 0,
+    seen: Callable[[Blocks], None] = lambda _blocks: None,
 ) -> Script[Blocks]:
     """LOG_REQUEST_DATA for what is missing, until nothing is."""
     blocks = Blocks(log.size, _PIECE, place, start)
@@ -172,6 +177,7 @@ def _pieces(
         while blocks.left:
             before = blocks.left
             offset, size = next(blocks.runs())
+            size = max(size, min(_SPAN, log.size - offset))  # one request for many small gaps, though some comes twice
             client.send(codec.message("LOG_REQUEST_DATA", id=log.number, ofs=offset, count=size, **client.address()))
             arrived_s = client.wall_s
             while client.wall_s < arrived_s + _QUIET_S and blocks.complete_to < offset + size:

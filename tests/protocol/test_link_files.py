@@ -345,6 +345,7 @@ def metadata(world: World, station: Station) -> tuple[Any, dict[str, Any], dict[
         assert uri.startswith("mftp://")
         data = world.converse(world.station(), fetch(uri.removeprefix("mftp://")), 5.0)
         assert crc32(data) == crc
+        assert data[:8] == b"\xfd7zXZ\0\0\x01"  # checked by CRC-32, the only check that ground stations know
         loaded: dict[str, Any] = json.loads(lzma.decompress(data))
         return loaded
 

@@ -34,7 +34,8 @@ FLIGHT = Flight("2026-01-02_03-04-05-678Z_instance-3", 3, 1_700_000_000.0, 1_000
 
 @pytest.fixture(scope="module")
 def vehicle() -> Vehicle:
-    return Vehicle(load_vehicle("yawsitter"))
+    """One that does not know exactly where it is."""
+    return Vehicle(load_vehicle("yawsitter-real"))
 
 
 @pytest.fixture
@@ -92,6 +93,7 @@ def test_a_flight_is_kept_whole_at_the_rate_of_the_control_steps(vehicle, record
     last = traced(rows[-1])
     assert state[-1]["position_N_m"] == [last.state.north_m, last.state.east_m, last.state.down_m]
     assert state[-1]["nav_position_N_m"] == [last.nav.north_m, last.nav.east_m, last.nav.down_m]
+    assert state[-1]["nav_position_N_m"] != state[-1]["position_N_m"]
     assert kept["yawsitter/3/setpoint"][-1]["position_N_m"][2] == last.reference.down_m
     assert kept["yawsitter/3/actuators"][-1]["thrust_left_command_N"] == last.command.thrust_left_N
     assert kept["yawsitter/3/attitude"][-1]["q_NB"][0] == last.state.qw
@@ -103,7 +105,7 @@ def test_a_flight_is_kept_whole_at_the_rate_of_the_control_steps(vehicle, record
     assert [(m["name"], m["value"]) for c in changes for m in c["parameters"]] == [("POS_X_P", 1.25)]
     assert "armed" in [m["text"] for m in kept["yawsitter/3/event"]]
     assert kept["yawsitter/3/mode"][0]["armed"]
-    assert kept["yawsitter/3/description"][0]["vehicle"]["name"] == "yawsitter"
+    assert kept["yawsitter/3/description"][0]["vehicle"]["name"] == "yawsitter-real"
     assert len(frames(tlog)) == 51  # the one before the arming too
 
 
