@@ -1,5 +1,6 @@
 """Files, logs and parameters of the real daemon, with the clients that people have: pymavlink's and mavlogdump."""
 
+import asyncio
 import contextlib
 import json
 import lzma
@@ -13,6 +14,7 @@ from pathlib import Path
 
 import pytest
 from daemon_process import BOOT_LIMIT_S, ROOT, Client, Daemon, mavlink
+from mavsdk_drone import Drone, Generation
 from mcap.reader import make_reader
 from pymavlink import mavftp, mavparm, mavutil
 
@@ -164,6 +166,59 @@ def test_pymavlinks_parameter_module_lists_writes_and_hears_a_refusal(daemon, li
             pass
     assert old is not None
     assert old.param_value == 0.625
+
+
+@pytest.mark.parametrize("generation", list(Generation), ids=lambda generation: generation.value)
+def test_mavsdk_transfers_files_both_ways_and_downloads_logs(daemon, tmp_path, generation) -> None:
+    mine = tmp_path / "mine.bin"
+    mine.write_bytes(bytes(range(256)) * 20)
+    log = min((daemon.state_dir / "logs").iterdir(), key=lambda path: path.stat().st_size)
+
+    async def talk() -> list[int]:
+        async with Drone.connected(generation, f"udpout://127.0.0.1:{14580 + daemon.instance}") as drone:
+            for burst in (True, False):
+                async for _ in drone.ftp.download(f"/logs/{log.name}", str(tmp_path), burst):
+                    pass
+                assert (tmp_path / log.name).read_bytes() == log.read_bytes()
+            async for _ in drone.ftp.upload(str(mine), "/scratch"):
+                pass
+            assert await drone.ftp.are_files_identical(str(mine), "/scratch/mine.bin")
+            await drone.ftp.create_directory("/scratch/folder")
+            await drone.ftp.rename("/scratch/mine.bin", "/scratch/folder/yours.bin")
+            await drone.ftp.remove_file("/scratch/folder/yours.bin")
+            await drone.ftp.remove_directory("/scratch/folder")
+            with pytest.raises(drone.types("ftp").FtpError):
+                await drone.ftp.remove_file(f"/logs/{log.name}")
+            entries = await drone.log_files.get_entries()
+            [wanted] = [entry for entry in entries if entry.size_bytes == log.stat().st_size]
+            async for _ in drone.log_files.download_log_file(wanted, str(tmp_path / "by-number")):
+                pass
+            return [entry.size_bytes for entry in entries]
+
+    sizes = asyncio.run(asyncio.wait_for(talk(), 90))
+    assert sizes == [path.stat().st_size for path in sorted((daemon.state_dir / "logs").iterdir())]
+    assert (tmp_path / "by-number").read_bytes() == log.read_bytes()
+
+
+def test_mavsdk_reads_what_the_parameters_mean(daemon) -> None:
+    from mavsdk import ComponentType, Configuration
+    from mavsdk.asyncio import Mavsdk
+    from mavsdk.asyncio.plugins.component_metadata import ComponentMetadataAsync
+    from mavsdk.plugins.component_metadata import MetadataType
+
+    async def talk() -> str:
+        async with Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION)) as mavsdk:
+            await mavsdk.add_any_connection(f"udpout://127.0.0.1:{14580 + daemon.instance}")
+            plugin = ComponentMetadataAsync(await mavsdk.first_autopilot(30.0))
+            await plugin.request_autopilot_component()
+            for _ in range(60):
+                await asyncio.sleep(0.5)
+                with contextlib.suppress(Exception):  # not there yet
+                    return (await plugin.get_metadata(1, MetadataType.PARAMETER)).json_metadata
+            raise AssertionError("no metadata in 30 s")
+
+    told = {p["name"]: p for p in json.loads(asyncio.run(talk()))["parameters"]}
+    assert told["MPC_XY_CRUISE"]["units"] == "m/s"
 
 
 def test_gcs_lists_fetches_and_erases_logs(daemon, tmp_path) -> None:
