@@ -67,6 +67,16 @@ def braked(error: float, p: float, braking_rad_s2: float) -> float:
 
 
 @kernel
+def braked_together(y: float, z: float, p_y: float, p_z: float, braking_y: float, braking_z: float) -> float:
+    """By what factor two errors [rad] shrink when both axes have to brake in time without leaving their direction."""
+    size = math.sqrt(y * y + z * z)
+    if size < 1e-9:
+        return 1.0
+    braking = min(braking_y * size / max(abs(y), 1e-9), braking_z * size / max(abs(z), 1e-9))
+    return braked(size, max(p_y, p_z), braking) / size
+
+
+@kernel
 def rate_command(g: Loop, error: Vec3, integral: Vec3, rates_B: Vec3, feedforward_B: Vec3) -> Vec3:
     """ω = K_p e + K_i ∫e + K_d (ω_ff − ω) + ω_ff [rad/s, B]: the derivative acts on the rates only."""
     return (

@@ -4,7 +4,15 @@ import math
 from typing import NamedTuple
 
 from sitl.control.allocation import allocate
-from sitl.control.attitude import attitude_of, braked, error_quaternion, error_yxz, rate_command, rates_of
+from sitl.control.attitude import (
+    attitude_of,
+    braked,
+    braked_together,
+    error_quaternion,
+    error_yxz,
+    rate_command,
+    rates_of,
+)
 from sitl.control.disturbance import Disturbance, Flaps, none, observed
 from sitl.control.feedforward import Trim, invert, refined
 from sitl.control.flow import flow_at
@@ -25,6 +33,7 @@ _LOOK_S = 0.02  # how far before and after now the reference is inverted for its
 _NEAR_COSINE = 0.7  # of the angle between the nose and its target
 _POSITION_INTEGRAL_MAX = 5.0  # m s
 _VELOCITY_INTEGRAL_MAX = 10.0  # m
+_LIFT_OFF, _SLIDE_M_S = 1.15, 0.1  # least lift over weight where feet that touch the ground slide so fast
 _LEARN_BELOW_M_S = 2.0  # velocity errors above it are not integrated
 _ANGLE_INTEGRAL_MAX = 1.0  # rad s
 _RATE_INTEGRAL_MAX = 2.0  # rad
@@ -244,6 +253,8 @@ def cascade(
         s.acceleration_max_m_s2,
         s.lean_max_rad,
     )
+    if guidance.aloft == 0.0 and math.hypot(velocity[0], velocity[1]) > _SLIDE_M_S:
+        f = (f[0], f[1], min(f[2], -_LIFT_OFF * GRAVITY_M_S2))  # light on its feet it slides before the wind: up
     force_N = (a.mass_kg * f[0], a.mass_kg * f[1], a.mass_kg * f[2])
 
     # body rates and moment that the reference itself needs: its trim now, a moment ago and a moment ahead
@@ -292,11 +303,10 @@ def cascade(
     error, nose = error_quaternion(q_NB, target)
     if s.quaternion_error == 0.0:
         error = error_yxz(q_NB, target)
-    error = (
-        braked(error[0], gains.attitude.x.p, s.braking_rad_s2.x),
-        braked(error[1], gains.attitude.y.p, s.braking_rad_s2.y),
-        braked(error[2], gains.attitude.z.p, s.braking_rad_s2.z),
+    k = braked_together(
+        error[1], error[2], gains.attitude.y.p, gains.attitude.z.p, s.braking_rad_s2.y, s.braking_rad_s2.z
     )
+    error = (braked(error[0], gains.attitude.x.p, s.braking_rad_s2.x), k * error[1], k * error[2])
     roll_held, pitch_held, yaw_held = m.roll_short > 0.0, m.pitch_short > 0.0, m.yaw_short > 0.0
     held = (roll_held, pitch_held, yaw_held)
     attitude_integral = _integrated(m.attitude_integral, error, dt_s, _ANGLE_INTEGRAL_MAX, held)

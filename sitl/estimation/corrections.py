@@ -102,13 +102,15 @@ def with_baro(e: Estimate, t: Tuning, height_m: float) -> Estimate:
 def with_field(e: Estimate, t: Tuning, field_B: Vec3) -> Estimate:
     """The magnetic field in B: its level direction tells how far the attitude is turned about N's down axis.
 
-    Roll and pitch are left alone: gravity tells them better than a field bent by the vehicle's own iron.
+    Where the field dips steeply, a tilt about the north axis looks like such a turn, tan(dip) times as large.
     """
-    north, east, _ = rotate(e.q_NB, field_B)
+    north, east, down = rotate(e.q_NB, field_B)
+    steep = down / max(math.sqrt(north * north + east * east), 0.1)
     dx, h = np.zeros(ERRORS), np.zeros(ERRORS)
     for i in range(3):
         axis = (1.0 if i == 0 else 0.0, 1.0 if i == 1 else 0.0, 1.0 if i == 2 else 0.0)
-        h[ATTITUDE + i] = rotate(e.q_NB, axis)[2]
+        turned_N = rotate(e.q_NB, axis)
+        h[ATTITUDE + i] = turned_N[2] - steep * turned_N[0]
     _fuse(e.covariance, dx, h, -math.atan2(east, north), t.heading_rad**2)
     return _injected(e, dx)
 

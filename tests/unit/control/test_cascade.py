@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sitl.control.allocation import allocate
-from sitl.control.attitude import attitude_of, braked, error_quaternion, error_yxz, rates_of
+from sitl.control.attitude import attitude_of, braked, braked_together, error_quaternion, error_yxz, rates_of
 from sitl.control.feedforward import invert
 from sitl.control.flow import flow_at
 from sitl.control.gains import GAIN_NAMES, Pid, from_names
@@ -173,3 +173,13 @@ def test_a_trajectory_rests_before_its_start_and_after_its_end() -> None:
     assert sample(t, 9.0)[0] == 3.0
     assert sample(t, 9.0)[3] == 0.0
     assert sample(rest_at(1.0, 2.0, 3.0, 4.0), 7.0)[:3] == (1.0, 2.0, 3.0)
+
+
+def test_two_axes_brake_together_so_that_the_turn_keeps_its_direction() -> None:
+    assert braked_together(0.02, 0.01, 8.0, 8.0, 25.0, 45.0) == 1.0  # small enough for both
+    assert braked_together(0.0, 0.0, 8.0, 8.0, 25.0, 45.0) == 1.0
+    alone = braked(2.0, 8.0, 25.0) / 2.0
+    assert braked_together(2.0, 0.0, 8.0, 8.0, 25.0, 45.0) == pytest.approx(alone)
+    # on the diagonal the weaker axis has 25 rad/s² for 1/√2 of the turn
+    diagonal = braked(2.0 * math.sqrt(2.0), 8.0, 25.0 * math.sqrt(2.0)) / (2.0 * math.sqrt(2.0))
+    assert braked_together(2.0, 2.0, 8.0, 8.0, 25.0, 45.0) == pytest.approx(diagonal)
