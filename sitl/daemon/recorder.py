@@ -31,7 +31,7 @@ STAMP = struct.Struct(">Q")  # of a frame in a .tlog: µs since 1970
 MESSAGE = struct.Struct("<BQ")  # number of the topic, simulation time [µs]
 BEGIN, FRAME, STEPS, TOPIC, END = b"B", b"F", b"S", b"M", b"E"
 
-BEFORE = 256  # frames kept from before the flight: they show what led to the arming
+BEFORE_BYTES = 1 << 20  # of frames from before the flight, some ten seconds: they show what led to the arming
 BACKLOG_MAX = 1 << 26  # bytes waiting for the pipe
 THIN_AT = 1 << 24  # of them; beyond, control steps are left out
 STRIDE_MAX = 1024
@@ -61,7 +61,8 @@ class Recorder:
         self.flight: str | None = None  # name of the one under way
         self._closing: dict[str, tuple[int, int]] = {}  # flights that are over but not yet on disk: steps kept, seen
         self.steps_seen = self.steps_kept = 0
-        self._before: deque[bytes] = deque(maxlen=BEFORE)
+        self._before: deque[bytes] = deque()
+        self._before_bytes = 0
         self._backlog = bytearray()
         self._stride = 1
         if importlib.util.find_spec("mcap") is None:
@@ -103,14 +104,18 @@ class Recorder:
         for stamped in self._before:
             self._put(FRAME, stamped)
         self._before.clear()
+        self._before_bytes = 0
 
     def frame(self, frame: bytes, unix_s: float) -> None:
         """A MAVLink frame that passes; between flights the last ones are remembered."""
         stamped = STAMP.pack(int(unix_s * 1e6)) + frame
-        if self.flight is None:
-            self._before.append(stamped)
-        else:
+        if self.flight is not None:
             self._put(FRAME, stamped)
+            return
+        self._before.append(stamped)
+        self._before_bytes += len(stamped)
+        while self._before_bytes > BEFORE_BYTES:
+            self._before_bytes -= len(self._before.popleft())
 
     def message(self, topic: int, now_us: int, data: bytes) -> None:
         """A telemetry message, of the topic with this number."""

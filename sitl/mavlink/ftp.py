@@ -223,16 +223,8 @@ class FtpService:
         self._files.truncate(_text(request.data), request.offset)
         return _Answer()
 
-    def _remove(self, client: _Client, request: Packet) -> _Answer:
-        self._files.remove(_text(request.data))
-        return _Answer()
-
-    def _make_folder(self, client: _Client, request: Packet) -> _Answer:
-        self._files.make_folder(_text(request.data))
-        return _Answer()
-
-    def _remove_folder(self, client: _Client, request: Packet) -> _Answer:
-        self._files.remove_folder(_text(request.data))
+    def _change(self, client: _Client, request: Packet) -> _Answer:
+        _CHANGES[request.opcode](self._files, _text(request.data))
         return _Answer()
 
     def _rename(self, client: _Client, request: Packet) -> _Answer:
@@ -258,9 +250,9 @@ class FtpService:
         Op.READ_FILE: _read,
         Op.CREATE_FILE: _open_to_write,
         Op.WRITE_FILE: _write,
-        Op.REMOVE_FILE: _remove,
-        Op.CREATE_DIRECTORY: _make_folder,
-        Op.REMOVE_DIRECTORY: _remove_folder,
+        Op.REMOVE_FILE: _change,
+        Op.CREATE_DIRECTORY: _change,
+        Op.REMOVE_DIRECTORY: _change,
         Op.OPEN_FILE_WO: _open_to_write,
         Op.TRUNCATE_FILE: _truncate,
         Op.RENAME: _rename,
@@ -334,6 +326,11 @@ class FtpService:
         self._link.send_packed(client.peer, _MESSAGE, (client.route + packet).rstrip(b"\0"))
 
 
+_CHANGES: dict[int, Callable[[Files, str], None]] = {
+    Op.REMOVE_FILE: Files.remove,
+    Op.CREATE_DIRECTORY: Files.make_folder,
+    Op.REMOVE_DIRECTORY: Files.remove_folder,
+}
 _CHANGING = {
     Op.TERMINATE_SESSION, Op.RESET_SESSIONS, Op.OPEN_FILE_RO, Op.CREATE_FILE, Op.WRITE_FILE, Op.REMOVE_FILE,
     Op.CREATE_DIRECTORY, Op.REMOVE_DIRECTORY, Op.OPEN_FILE_WO, Op.TRUNCATE_FILE, Op.RENAME,

@@ -22,7 +22,7 @@ from sitl.daemon import flight_writer
 from sitl.daemon.config import SettingError
 from sitl.daemon.flight_recorder import FlightRecorder
 from sitl.daemon.flight_writer import FlightFiles, make_room, schema, write
-from sitl.daemon.recorder import BACKLOG_MAX, BEGIN, FRAME, HEAD, STAMP, STEPS, Flight, Recorder
+from sitl.daemon.recorder import BACKLOG_MAX, BEFORE_BYTES, BEGIN, FRAME, HEAD, STAMP, STEPS, Flight, Recorder
 from sitl.mavlink.codec import Encoder, message
 from sitl.telemetry import messages
 from sitl.telemetry.feed import Feed
@@ -120,6 +120,18 @@ def test_each_flight_gets_files_of_its_own_and_the_time_between_gets_none(vehicl
     assert not recorder.writes(f"{last}.mcap")
     sizes = [len(contents(path)["yawsitter/3/state"]) for path in sorted(tmp_path.glob("*.mcap"))]
     assert sizes == [50, 100]
+
+
+def test_of_the_time_before_a_flight_the_last_frames_are_kept_and_no_more(recorder, tmp_path) -> None:
+    for k in range(2 * BEFORE_BYTES // len(HEARTBEAT)):
+        recorder.frame(HEARTBEAT, 1000.0 + k)
+    recorder.begin(1e6, 0, (55.0, 37.0, 190.0))
+    recorder.close()
+    [tlog] = tmp_path.glob("*.tlog")
+    stamped = STAMP.size + len(HEARTBEAT)
+    assert BEFORE_BYTES - stamped < tlog.stat().st_size <= BEFORE_BYTES
+    newest = tlog.read_bytes()[-stamped:]
+    assert STAMP.unpack_from(newest)[0] == (1000 + 2 * BEFORE_BYTES // len(HEARTBEAT) - 1) * 1_000_000
 
 
 def test_the_log_time_is_the_wall_time_at_arming_plus_simulation_time(tmp_path) -> None:
