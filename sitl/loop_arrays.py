@@ -4,6 +4,7 @@ Numba takes nested tuples apart and builds them again on every call, 10 µs for 
 it: as much as five control steps. Here both live in flat arrays between calls, and become tuples inside.
 """
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -175,6 +176,12 @@ def run_in_place(
 def state_of(loop: Array) -> State:
     """The plant's state alone."""
     return State(*loop[:17].tolist())
+
+
+def accuracy_of(loop: Array) -> tuple[float, float]:
+    """Standard deviations [m] that the filter gives its own level position and height."""
+    variance = loop[_COVARIANCE : _MEMORY : ERRORS + 1].tolist()
+    return math.sqrt(max(0.0, variance[0] + variance[1])), math.sqrt(max(0.0, variance[2]))
 
 
 def nav_of(observed: Array) -> NavState:

@@ -52,3 +52,4 @@ class Snapshot(NamedTuple):
     breach: Breach = Breach()
     fenced: bool = False  # there is a fence to keep to
     orbiting: Orbiting | None = None
+    nav_accuracy_m: tuple[float, float] = (0.0, 0.0)  # of level position and height, by the filter's own deviations

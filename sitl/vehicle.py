@@ -20,6 +20,7 @@ from sitl.geodesy import GeoPoint
 from sitl.loop_arrays import (
     LOOP_SIZE,
     OBSERVED_SIZE,
+    accuracy_of,
     loop_of,
     nav_of,
     observed_of,
@@ -196,11 +197,15 @@ class Vehicle:
         plant = Plant(a, self._gear, self.spec.actuators, self.spec.sensors, wind, self.spec.substeps)
         gains = from_names({name: p[name] for name in GAIN_NAMES})
         estimating = float(p["EST_ENABLE"])
-        if self._controller is not None and estimating > self._controller.estimating:
+        if self._controller is not None and estimating > self._controller.estimating:  # switched on in flight
             self.loop = self.loop._replace(estimate=knowing(self.loop.state))
         controller = self._controller = Controller(self._believed, gains, self.settings(), estimating, self.tuning())
         self._noisy = wind.gust_m_s > 0.0 or any(self.spec.sensors)
         self._plants, self._controllers = packed(plant), packed(controller)
+
+    @property
+    def _estimating(self) -> bool:
+        return self._controller is not None and self._controller.estimating > 0.0
 
     @property
     def loop(self) -> LoopState:
@@ -300,6 +305,7 @@ class Vehicle:
             fenced=c.geofence.present,
             orbiting=c.guided.orbiting,
             battery=self._battery(),
+            nav_accuracy_m=accuracy_of(self._loop_array) if self._estimating else (0.0, 0.0),
         )
         return self._snapshot
 

@@ -210,11 +210,9 @@ _NO_CELLS = (_UNKNOWN_U16,) * 9
 
 
 def estimator_status(v: View) -> Values:
-    """Accuracies are the true errors: a simulator knows them."""
-    nav, truth = v.s.nav, v.s.truth
-    horizontal = math.hypot(nav.north_m - truth.north_m, nav.east_m - truth.east_m)
+    """Accuracies are the filter's own; zero where the vehicle knows its state."""
     flags = _ESTIMATOR if v.nav_is_finite else 0
-    return v.s.now_us, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, horizontal, abs(nav.down_m - truth.down_m), flags
+    return v.s.now_us, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, *v.s.nav_accuracy_m, flags
 
 
 def wind_cov(v: View) -> Values:

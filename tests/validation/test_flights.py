@@ -196,3 +196,37 @@ def test_a_parameter_that_is_refused_at_start_says_its_range() -> None:
         Vehicle(load_vehicle("yawsitter"), overrides={"POS_X_P": 1000.0})
     with pytest.raises(ConfigError, match="parameter NO_SUCH: unknown"):
         Vehicle(load_vehicle("yawsitter"), overrides={"NO_SUCH": 1.0})
+
+
+def test_the_filter_tells_how_well_it_knows_the_position_and_is_about_right() -> None:
+    vehicle = hovering("yawsitter-real")
+    errors = []
+    for _ in range(400):
+        vehicle.advance(vehicle.now_us + 100_000)
+        s = vehicle.snapshot()
+        errors.append((s.nav.north_m - s.truth.north_m, s.nav.east_m - s.truth.east_m, s.nav.down_m - s.truth.down_m))
+    level, height = s.nav_accuracy_m
+    north, east, down = np.sqrt(np.mean(np.square(errors), axis=0))
+    assert level == pytest.approx(math.hypot(north, east), rel=0.5)
+    assert height == pytest.approx(down, rel=0.5)
+    assert hovering("yawsitter").snapshot().nav_accuracy_m == (0.0, 0.0)
+
+
+def test_the_filter_can_be_switched_on_in_flight() -> None:
+    vehicle = hovering("yawsitter-real", overrides={"EST_ENABLE": 0})
+    assert vehicle.parameters.set("EST_ENABLE", 1.0) is None
+    trace = traced(vehicle, 10.0)
+    assert np.abs(trace[:, 1:4] - (0.0, 0.0, -5.0)).max() < 0.05
+
+
+def test_it_takes_off_and_lands_in_wind_that_would_slide_it_on_its_feet() -> None:
+    vehicle = Vehicle(load_vehicle("yawsitter-real"), wind_N=(-3.0, 0.0, 0.0), seed=2)
+    vehicle.advance(1_000_000)
+    assert vehicle.commander.takeoff().ok
+    assert vehicle.commander.arm().ok
+    trace = traced(vehicle, 15.0)
+    assert np.abs(trace[:, 1:3]).max() < 1.0
+    assert vehicle.commander.land().ok
+    vehicle.advance(vehicle.now_us + 20_000_000)
+    s = vehicle.snapshot()
+    assert (s.armed, s.tipped_over) == (False, False)
