@@ -241,6 +241,7 @@ def run(
     plant, controller = plants[0], controllers[0]
     s, gusts, errors, memory = loop.state, loop.gusts, loop.sensors, loop.memory
     estimating, noisy = controller.estimating > 0.0, noise.shape[0] > 0
+    gusty = noisy and plant.wind.gust_m_s > 0.0
     estimate = copied(loop.estimate)
     quiet = np.zeros(NOISES)
     dt_s = dt_us * 1e-6
@@ -251,7 +252,7 @@ def run(
     reference = sample(guidance.trajectory, start_us * 1e-6)
     for k in range(steps):
         t_s = (start_us + k * dt_us) * 1e-6
-        if noisy:
+        if gusty:
             n = noise[k]
             rn, re, rd = s.v_north_m_s - wind_N[0], s.v_east_m_s - wind_N[1], s.v_down_m_s - wind_N[2]
             speed = math.sqrt(rn * rn + re * re + rd * rd)
