@@ -11,10 +11,9 @@ from sitl.control.attitude import (
     error_quaternion,
     error_yxz,
     rate_command,
-    rates_of,
 )
 from sitl.control.disturbance import Disturbance, Flaps, none, observed
-from sitl.control.feedforward import Trim, invert, refined
+from sitl.control.feedforward import Trim, heading_frame, invert, reference_needs, refined
 from sitl.control.flow import flow_at
 from sitl.control.gains import Gains, Settings
 from sitl.control.guidance import Guidance
@@ -29,7 +28,6 @@ from sitl.model.airframe import Airframe
 from sitl.navigation import NavState
 from sitl.quaternion import Quat, Vec3, rotate_back
 
-_LOOK_S = 0.02  # how far before and after now the reference is inverted for its attitude rates
 _NEAR_COSINE = 0.7  # of the angle between the nose and its target
 _POSITION_INTEGRAL_MAX = 5.0  # m s
 _VELOCITY_INTEGRAL_MAX = 10.0  # m
@@ -95,41 +93,6 @@ def standing_command(nav: NavState, thrust_each_N: float) -> Command:
     """Motors at a given thrust, flaps centred: the vehicle stands, disarmed or idling."""
     t = thrust_each_N
     return Command(nav.qw, nav.qx, nav.qy, nav.qz, 0.0, 0.0, 0.0, t, t, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
-
-@kernel
-def _heading_frame(heading_rad: float, x: float, y: float, z: float) -> Vec3:
-    c, s = math.cos(heading_rad), math.sin(heading_rad)
-    return c * x + s * y, c * y - s * x, z
-
-
-@kernel
-def _reference_trim(a: Airframe, r: Reference, start: Trim, fresh_slope: bool) -> Trim:
-    """The trim that the reference's own velocity and acceleration need.
-
-    Two passes: the second difference of three such trims is taken, which would show what one pass leaves over.
-    """
-    m = a.mass_kg
-    force = _heading_frame(r.heading_rad, m * r.a_north_m_s2, m * r.a_east_m_s2, m * (r.a_down_m_s2 - GRAVITY_M_S2))
-    air = _heading_frame(r.heading_rad, r.v_north_m_s, r.v_east_m_s, r.v_down_m_s)
-    return refined(a, force, air, 0.0, refined(a, force, air, 0.0, start, fresh_slope), False)
-
-
-@kernel
-def _carried(r: Reference, h: float) -> Reference:
-    """The reference's velocity and acceleration h seconds on, at constant jerk."""
-    k = 0.5 * h * h
-    return Reference(
-        r.north_m, r.east_m, r.down_m,
-        r.v_north_m_s + h * r.a_north_m_s2 + k * r.j_north_m_s3,
-        r.v_east_m_s + h * r.a_east_m_s2 + k * r.j_east_m_s3,
-        r.v_down_m_s + h * r.a_down_m_s2 + k * r.j_down_m_s3,
-        r.a_north_m_s2 + h * r.j_north_m_s3,
-        r.a_east_m_s2 + h * r.j_east_m_s3,
-        r.a_down_m_s2 + h * r.j_down_m_s3,
-        r.j_north_m_s3, r.j_east_m_s3, r.j_down_m_s3,
-        r.heading_rad + h * r.heading_rate_rad_s, r.heading_rate_rad_s,
-    )  # fmt: skip
 
 
 @kernel
@@ -257,25 +220,12 @@ def cascade(
         f = (f[0], f[1], min(f[2], -_LIFT_OFF * GRAVITY_M_S2))  # light on its feet it slides before the wind: up
     force_N = (a.mass_kg * f[0], a.mass_kg * f[1], a.mass_kg * f[2])
 
-    # body rates and moment that the reference itself needs: its trim now, a moment ago and a moment ahead
-    now = _reference_trim(a, ref, m.reference_trim, True)
-    rates_ff = (0.0, 0.0, 0.0)
-    moment_ff = (0.0, 0.0, 0.0)
+    # body rates and moment that the reference itself needs
     steering = guidance.steering
+    ahead = s.feedforward_inverse > 0.0 and steering.steered == 0.0
+    now, rates_ff, moment_ff = reference_needs(a, ref, m.reference_trim, ahead)
     if steering.steered > 0.0:
         rates_ff = (steering.p_rad_s, steering.q_rad_s, steering.r_rad_s)
-    elif s.feedforward_inverse > 0.0:
-        before = _reference_trim(a, _carried(ref, -_LOOK_S), now, False)
-        after = _reference_trim(a, _carried(ref, _LOOK_S), now, False)
-        pitch_rate = (after.pitch_rad - before.pitch_rad) / (2.0 * _LOOK_S)
-        lean_rate = (after.lean_rad - before.lean_rad) / (2.0 * _LOOK_S)
-        rates_ff = rates_of(now.lean_rad, now.pitch_rad, ref.heading_rate_rad_s, pitch_rate, lean_rate)
-        moment_ff = (
-            0.0,
-            a.jyy_kg_m2 * (after.pitch_rad - 2.0 * now.pitch_rad + before.pitch_rad) / (_LOOK_S * _LOOK_S),
-            a.jzz_kg_m2 * (after.lean_rad - 2.0 * now.lean_rad + before.lean_rad) / (_LOOK_S * _LOOK_S),
-        )
-
     moment_ff = (
         moment_ff[0] - a.jxx_kg_m2 * turning[0],
         moment_ff[1] - a.jyy_kg_m2 * turning[1],
@@ -285,8 +235,8 @@ def cascade(
     # pitch and lean: the attitude whose trim gives the wanted force at the present velocity
     trim = refined(
         a,
-        _heading_frame(ref.heading_rad, force_N[0], force_N[1], force_N[2]),
-        _heading_frame(ref.heading_rad, velocity[0], velocity[1], velocity[2]),
+        heading_frame(ref.heading_rad, force_N[0], force_N[1], force_N[2]),
+        heading_frame(ref.heading_rad, velocity[0], velocity[1], velocity[2]),
         moment_ff[1],
         m.command_trim,
         True,

@@ -1,8 +1,11 @@
-"""The trim's inverse model: which pitch, lean, thrust and flap give a wanted force at a given velocity."""
+"""The trim's inverse model: which pitch, lean, thrust and flap give a wanted force, and what a reference needs."""
 
 import math
 from typing import NamedTuple
 
+from sitl.control.attitude import rates_of
+from sitl.control.reference import Reference
+from sitl.frames import GRAVITY_M_S2
 from sitl.jit import kernel
 from sitl.model.aerodynamics import flap_pressure, panel
 from sitl.model.airframe import Airframe
@@ -10,6 +13,7 @@ from sitl.model.propulsion import wake_speed
 from sitl.quaternion import Vec3
 
 _STEP = 1e-4  # rad, for the slope of the pitch equation
+_LOOK_S = 0.02  # how far before and after now a reference is inverted for its attitude rates
 
 
 class Trim(NamedTuple):
@@ -76,3 +80,59 @@ def invert(
     for _ in range(passes):
         trim = refined(a, force, air, moment_y, trim, True)
     return trim
+
+
+@kernel
+def heading_frame(heading_rad: float, x: float, y: float, z: float) -> Vec3:
+    """A vector of N in the frame that is turned by the heading about N's down axis."""
+    c, s = math.cos(heading_rad), math.sin(heading_rad)
+    return c * x + s * y, c * y - s * x, z
+
+
+@kernel
+def _reference_trim(a: Airframe, r: Reference, start: Trim, fresh_slope: bool) -> Trim:
+    """The trim that the reference's own velocity and acceleration need.
+
+    Two passes: the second difference of three such trims is taken, which would show what one pass leaves over.
+    """
+    m = a.mass_kg
+    force = heading_frame(r.heading_rad, m * r.a_north_m_s2, m * r.a_east_m_s2, m * (r.a_down_m_s2 - GRAVITY_M_S2))
+    air = heading_frame(r.heading_rad, r.v_north_m_s, r.v_east_m_s, r.v_down_m_s)
+    return refined(a, force, air, 0.0, refined(a, force, air, 0.0, start, fresh_slope), False)
+
+
+@kernel
+def _carried(r: Reference, h: float) -> Reference:
+    """The reference's velocity and acceleration h seconds on, at constant jerk."""
+    k = 0.5 * h * h
+    return Reference(
+        r.north_m, r.east_m, r.down_m,
+        r.v_north_m_s + h * r.a_north_m_s2 + k * r.j_north_m_s3,
+        r.v_east_m_s + h * r.a_east_m_s2 + k * r.j_east_m_s3,
+        r.v_down_m_s + h * r.a_down_m_s2 + k * r.j_down_m_s3,
+        r.a_north_m_s2 + h * r.j_north_m_s3,
+        r.a_east_m_s2 + h * r.j_east_m_s3,
+        r.a_down_m_s2 + h * r.j_down_m_s3,
+        r.j_north_m_s3, r.j_east_m_s3, r.j_down_m_s3,
+        r.heading_rad + h * r.heading_rate_rad_s, r.heading_rate_rad_s,
+    )  # fmt: skip
+
+
+@kernel
+def reference_needs(a: Airframe, r: Reference, start: Trim, ahead: bool) -> tuple[Trim, Vec3, Vec3]:
+    """(trim, body rates [rad/s], moment [N·m, B]) that the reference itself needs; both zero unless looked `ahead`.
+
+    Rates and moment are those of its trim's attitude, from its trim now, a moment ago and a moment on.
+    """
+    zero = (0.0, 0.0, 0.0)
+    now = _reference_trim(a, r, start, True)
+    if not ahead:
+        return now, zero, zero
+    before = _reference_trim(a, _carried(r, -_LOOK_S), now, False)
+    after = _reference_trim(a, _carried(r, _LOOK_S), now, False)
+    pitch_rate = (after.pitch_rad - before.pitch_rad) / (2.0 * _LOOK_S)
+    lean_rate = (after.lean_rad - before.lean_rad) / (2.0 * _LOOK_S)
+    pitching = (after.pitch_rad - 2.0 * now.pitch_rad + before.pitch_rad) / (_LOOK_S * _LOOK_S)
+    leaning = (after.lean_rad - 2.0 * now.lean_rad + before.lean_rad) / (_LOOK_S * _LOOK_S)
+    rates = rates_of(now.lean_rad, now.pitch_rad, r.heading_rate_rad_s, pitch_rate, lean_rate)
+    return now, rates, (0.0, a.jyy_kg_m2 * pitching, a.jzz_kg_m2 * leaning)
