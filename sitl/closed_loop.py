@@ -19,6 +19,7 @@ from sitl.frames import GRAVITY_M_S2
 from sitl.jit import kernel
 from sitl.model.airframe import Airframe, Gear
 from sitl.model.derivative import ActuatorCommand, Actuators, Loads, loads, total
+from sitl.model.failures import SOUND, Failures, followed, heard, misplaced_m
 from sitl.model.integrate import step
 from sitl.model.rigid_body import State, accelerations
 from sitl.model.sensors import (
@@ -53,6 +54,7 @@ class Plant(NamedTuple):
     sensors: Sensors
     wind: Wind
     substeps: int  # Runge-Kutta steps in a control step
+    failures: Failures = SOUND
 
 
 class Controller(NamedTuple):
@@ -158,18 +160,27 @@ def _standing(e: SensorState) -> bool:
 
 @kernel
 def _navigated(
-    e: Estimate, t: Tuning, p: Sensors, errors: SensorState, s: State, noise: Array, off: bool, now_us: int, dt_us: int
+    e: Estimate,
+    t: Tuning,
+    plant: Plant,
+    errors: SensorState,
+    s: State,
+    noise: Array,
+    off: bool,
+    now_us: int,
+    dt_us: int,
 ) -> Estimate:
     """The estimate one control step later, with every reading that is due. off: the motors are."""
-    dt_s = dt_us * 1e-6
+    dt_s, p, receiver = dt_us * 1e-6, plant.sensors, plant.failures.gnss
     e = predicted(e, errors.gyro_rad_s, errors.accel_m_s2, dt_s)
     if due(_COVARIANCE_HZ, now_us, dt_us):
         spread(e, t, max(1.0 / _COVARIANCE_HZ, dt_s))
         if off and _standing(errors):
             e = stood(e, t, dt_s)
-    if due(p.gnss_rate_Hz, now_us, dt_us):
+    if due(p.gnss_rate_Hz, now_us, dt_us) and heard(receiver, now_us):
         fix = gnss(p, errors, s, noise)
-        e = with_gnss(e, t, fix.position_N, fix.velocity_N)
+        north, east, down = fix.position_N
+        e = with_gnss(e, t, (north + misplaced_m(receiver), east, down), fix.velocity_N)
     if due(p.baro_rate_Hz, now_us, dt_us):
         e = with_baro(e, t, baro(p, errors, s, noise))
     if due(p.mag_rate_Hz, now_us, dt_us):
@@ -275,7 +286,8 @@ def run(
         if trace.shape[0] > 0:
             _trace(plant, s, command, reference, nav, wind_N, t_s, trace[k])
         for _ in range(plant.substeps):
-            s = step(plant.airframe, plant.gear, plant.actuators, s, actuators, wind_N, h_s)
+            driven = followed(plant.failures, plant.airframe, s, actuators)
+            s = step(plant.airframe, plant.gear, plant.actuators, s, driven, wind_N, h_s)
         if estimating or noisy:
             felt = (0.0, 0.0, 0.0)
             if estimating:
@@ -285,7 +297,7 @@ def run(
             if estimating:
                 off = guidance.effort == _OFF
                 now_us = start_us + (k + 1) * dt_us
-                estimate = _navigated(estimate, controller.tuning, plant.sensors, errors, s, n, off, now_us, dt_us)
+                estimate = _navigated(estimate, controller.tuning, plant, errors, s, n, off, now_us, dt_us)
     if guidance.effort <= _IDLE and steps > 0:
         memory = at_rest(controller.airframe, controller.airframe.thrust_min_N)
     acting, specific_force, linear = _motion(plant, s, wind_N)

@@ -53,3 +53,4 @@ class Snapshot(NamedTuple):
     fenced: bool = False  # there is a fence to keep to
     orbiting: Orbiting | None = None
     nav_accuracy_m: tuple[float, float] = (0.0, 0.0)  # of level position and height, by the filter's own deviations
+    gnss_heard: bool = True  # the satellite receiver gives fixes

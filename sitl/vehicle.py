@@ -32,6 +32,7 @@ from sitl.model.airframe import Airframe
 from sitl.model.airframe import description as airframe_description
 from sitl.model.derivative import Load, by_cause
 from sitl.model.derivative import loads as plant_loads
+from sitl.model.failures import SOUND, Failures, heard
 from sitl.model.rigid_body import State
 from sitl.model.sensors import NOISES, PERFECT, TURN_ON, magnetometer, step_sensors, switched_on
 from sitl.model.wind import Wind
@@ -102,6 +103,7 @@ class Vehicle:
         self.offboard = Offboard(self.parameters, self.plans.geofence.objection, full_N, hover_N)
         self.commander = Commander(self.parameters, self.plans, self.offboard, self.events, heading_rad)
         self._gear = spec.airframe.gear
+        self._failures = SOUND
         self.reset()
 
     def _override(self, name: str, value: float) -> None:
@@ -119,7 +121,7 @@ class Vehicle:
     def reset(self) -> None:
         """Back to standing at the start point, motors off; simulation time, parameters and plan stay."""
         self._random = np.random.Generator(np.random.PCG64(self.seed))
-        self._generation = -1
+        self.failures = SOUND
         self._controller: Controller | None = None
         self._build_constants()
         q = standing(self.heading_rad, self._gear.standing_pitch_rad)
@@ -136,6 +138,16 @@ class Vehicle:
         self.commander.restart(self.heading_rad)
         self._guidance = self.commander.guidance
         self._run(0, _NO_TRACE)
+
+    @property
+    def failures(self) -> Failures:
+        """What has failed; it holds from the next control step on."""
+        return self._failures
+
+    @failures.setter
+    def failures(self, failures: Failures) -> None:
+        self._failures = failures
+        self._generation = -1  # of the constants
 
     def _standing(self, state: State) -> LoopState:
         """The loop of a vehicle that stands in `state`, its sensors switched on and the filter aligned to them."""
@@ -194,7 +206,7 @@ class Vehicle:
         self._generation = p.generation
         a = self.spec.airframe.airframe
         wind = Wind(p["SIM_WIND_N"], p["SIM_WIND_E"], p["SIM_WIND_D"], p["SIM_GUST"])
-        plant = Plant(a, self._gear, self.spec.actuators, self.spec.sensors, wind, self.spec.substeps)
+        plant = Plant(a, self._gear, self.spec.actuators, self.spec.sensors, wind, self.spec.substeps, self._failures)
         gains = from_names({name: p[name] for name in GAIN_NAMES})
         estimating = float(p["EST_ENABLE"])
         if self._controller is not None and estimating > self._controller.estimating:  # switched on in flight
@@ -304,6 +316,7 @@ class Vehicle:
             breach=c.geofence.breach,
             fenced=c.geofence.present,
             orbiting=c.guided.orbiting,
+            gnss_heard=heard(self._failures.gnss, self.now_us),
             battery=self._battery(),
             nav_accuracy_m=accuracy_of(self._loop_array) if self._estimating else (0.0, 0.0),
         )

@@ -145,6 +145,8 @@ class Endpoint:
         """Take a datagram. Never raises, whatever the bytes. False: it was more than its sender may send."""
         link = self._link
         link.wall_s = wall_s
+        if link.silent:
+            return True
         peer = link.peers.find(kind, address)
         allowance = peer.allowance if peer is not None else self._strangers
         if not allowance.take(wall_s):
@@ -253,7 +255,7 @@ class Endpoint:
         out = link.outbox
         if out:
             link.outbox = []
-        return out
+        return [] if link.silent else out
 
     def next_deadline(self) -> float:
         """Wall time of the next heartbeat, repetition or timeout: poll by then even if nothing else happens."""

@@ -1,5 +1,6 @@
 """What all services of the link share: the vehicle, the peers, the time, and the way out for messages."""
 
+import math
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -56,6 +57,15 @@ class Link:
         self._craft = Craft.of(vehicle.spec.airframe.airframe)
         self._view: View | None = None
         self._text_id = 0
+        self._silent_s = (math.inf, -math.inf)  # wall time from when to when the link carries nothing
+
+    def silence(self, seconds: float) -> None:
+        """Carry nothing either way for so long, from after what is being handled now."""
+        self._silent_s = (self.wall_s, self.wall_s + seconds)
+
+    @property
+    def silent(self) -> bool:
+        return self._silent_s[0] < self.wall_s < self._silent_s[1]
 
     def view(self) -> View:
         """What the messages show of the vehicle now."""

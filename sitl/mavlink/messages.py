@@ -53,6 +53,8 @@ _UNKNOWN_U16 = 0xFFFF
 def sys_status(v: View) -> Values:
     s = v.s
     healthy = _SENSORS if v.nav_is_finite else 0
+    if not s.gnss_heard:
+        healthy &= ~mav.MAV_SYS_STATUS_SENSOR_GPS
     if not s.tipped_over:
         healthy |= _CONTROL
     if s.battery.remaining > 0.0:
@@ -78,6 +80,7 @@ def gps_raw_int(v: View) -> Values:
     speed = v.groundspeed_m_s
     course = cdeg(math.atan2(nav.v_east_m_s, nav.v_north_m_s)) if speed > 0.1 else _UNKNOWN_U16
     altitude = mm(v.alt_amsl_m)
+    fix, satellites = (mav.GPS_FIX_TYPE_3D_FIX, 12) if v.s.gnss_heard else (mav.GPS_FIX_TYPE_NO_FIX, 0)
     return (
         v.s.now_us,
         degE7(lat),
@@ -87,8 +90,8 @@ def gps_raw_int(v: View) -> Values:
         100,
         uint16(speed * 100.0),
         course,
-        mav.GPS_FIX_TYPE_3D_FIX,
-        12,
+        fix,
+        satellites,
         altitude,
         0,
         0,

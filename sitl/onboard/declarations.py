@@ -62,6 +62,12 @@ def _choice(name: str, default: int, group: str, short: str, values: tuple[tuple
     return Declaration(name, True, default, min(numbers), max(numbers), "", group, short, values=values)
 
 
+def _told(name: str, is_int: bool, value: float, unit: str, short: str) -> Declaration:
+    """What ground stations read under PX4's dialect before they call a vehicle set up; it can't be changed."""
+    group, most = "Compatibility (read-only)", 2.0 * value
+    return Declaration(name, is_int, value, 0.0, most, unit, group, short, read_only=True, persistent=False)
+
+
 _OFF_ON = ((0, "off"), (1, "on"))
 _LOSS_ACTIONS = ((3, "Return"), (4, "Land"), (5, "Hold"))
 
@@ -108,6 +114,13 @@ _TABLE = (
     _real("BAT_LOW_THR", 0.15, 0.0, 1.0, "", "Failsafe", "Share of the battery below which it is low"),
     _real("BAT_CRIT_THR", 0.07, 0.0, 1.0, "", "Failsafe", "Share of the battery that is critical"),
     _real("BAT_EMERGEN_THR", 0.05, 0.0, 1.0, "", "Failsafe", "Share of the battery that is an emergency"),
+    # what QGroundControl asks of a PX4 vehicle's airframe, sticks and battery (its vehicle setup reads these names)
+    _told("SYS_AUTOSTART", True, 1102, "", "PX4's number for a simulated tail-sitter; nothing depends on it"),
+    _told("COM_RC_IN_MODE", True, 1, "", "Sticks come as MANUAL_CONTROL, not from a radio"),
+    _told("BAT1_N_CELLS", True, 3, "", "Cells of the simulated battery in series"),
+    _told("BAT1_V_CHARGED", False, 4.2, "V", "Voltage of a full cell"),
+    _told("BAT1_V_EMPTY", False, 3.5, "V", "Voltage of an empty cell"),
+    _told("BAT1_CAPACITY", False, 2200.0, "mAh", "Charge of the simulated battery"),
     # the cascade beside its gains
     _choice("SYS_ATT_ERROR", 1, "Cascade", "Attitude error", ((0, "paper's YXZ angles"), (1, "quaternion"))),
     _choice("FF_VELOCITY", 1, "Cascade", "Feed-forward of the reference's velocity", _OFF_ON),
@@ -151,6 +164,8 @@ _TABLE = (
     _real("SIM_WIND_E", 0.0, -30.0, 30.0, "m/s", "Simulation", "Wind: the air's motion to the east", kept=False),
     _real("SIM_WIND_D", 0.0, -30.0, 30.0, "m/s", "Simulation", "Wind: the air's motion downward", kept=False),
     _real("SIM_GUST", 0.0, 0.0, 10.0, "m/s", "Simulation", "Standard deviation of horizontal Dryden gusts", kept=False),
+    _choice("SYS_FAILURE_EN", 0, "Simulation", "Whether failures may be injected (INJECT_FAILURE)", _OFF_ON),
+    _real("SIM_LINK_OFF_T", 10.0, 1.0, 60.0, "s", "Simulation", "How long an injected failure of the link lasts"),
     _real("SIM_TLM_RATE", 50.0, 1.0, 500.0, "Hz", "Simulation", "Rate of the telemetry fan-out (simulation time)"),
 )  # fmt: skip
 
