@@ -1,15 +1,13 @@
-"""What one client said over a recorded link, and what it was answered.
+"""What one client said, and what it was answered.
 
-The recording is the daemon's .tlog, which the endpoint's frame tap feeds. Only what a client chose to say is kept, as
-sets: counts and order differ from run to run.
+Only what a client chose to say is kept, and as sets: counts and order differ from run to run.
 """
 
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Iterable
 
 import msgspec
 
-from sitl.mavlink.codec import Frame, Parser, by_id, mav
+from sitl.mavlink.codec import Frame, by_id, mav
 
 ANSWERS: dict[str, tuple[str, ...]] = {
     "HEARTBEAT": ("HEARTBEAT",),
@@ -65,24 +63,13 @@ class Observation(msgspec.Struct, frozen=True):
     rates: dict[str, list[str]] = {}
 
 
-def frames(tlog: Path) -> Iterator[Frame]:
-    """The frames of a recording."""
-    data, parser = memoryview(tlog.read_bytes()), Parser()
-    place = 8
-    while place + 2 < len(data):
-        length = data[place + 1]
-        total = length + 12 + (13 if data[place + 2] & 1 else 0) if data[place] == 0xFD else length + 8
-        yield from parser.feed(bytes(data[place : place + total]))
-        place += total + 8
-
-
-def observe(recording: Iterator[Frame], vehicle: int) -> Observation:
-    """Reduce a recording of the system `vehicle` and one client."""
+def observe(frames: Iterable[Frame], vehicle: int) -> Observation:
+    """Reduce what passed, in its order, between the system `vehicle` and one client."""
     sent: set[str] = set()
     heard: set[str] = set()
     results: tuple[dict[str, set[str]], ...] = ({}, {}, {})
     asked: dict[int, tuple[dict[str, set[str]], str]] = {}
-    for frame in recording:
+    for frame in frames:
         name, m = frame.name, frame.message
         if frame.system != vehicle:
             sent.add(name)

@@ -48,7 +48,7 @@ def _loiter(link: "Link", _peer: "Peer", c: Command) -> Reply:
     place, yaw = _target(link, c), c.params[3]
     if place is None:
         return denied(f"Loiter refused: {_NO_PLACE}")
-    if all(map(math.isnan, (*place, yaw))):
+    if all(map(math.isnan, place)) and not c.number(4):  # mavutil's set_mode_loiter sends nothing but zeros
         return reply_to(link.vehicle.commander.hold())
     return reply_to(link.vehicle.commander.guided.reposition(place, _radians(yaw)))
 

@@ -175,7 +175,9 @@ class MissionService:
             self._downloads.pop(next(iter(self._downloads)))
         now_s = self._link.wall_s
         download = Download(kind, store.items, store.plan_id, now_s, now_s)
-        self._downloads[partner, kind] = download
+        self._downloads.pop((partner, kind), None)
+        if download.items:  # a count of nothing ends it: MAVProxy doesn't acknowledge one
+            self._downloads[partner, kind] = download
         self._say(partner, download)
 
     def on_request(self, peer: "Peer", frame: Frame) -> None:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from sitl.mavlink.link import Link
     from sitl.mavlink.peers import Peer
 
-FORCE_SET, YAW_IGNORE, YAW_RATE_IGNORE = 0x200, 0x400, 0x800
+ACCELERATION_IGNORE, FORCE_SET, YAW_IGNORE, YAW_RATE_IGNORE = 0x1C0, 0x200, 0x400, 0x800
 THRUST_BODY_SET, THROTTLE_IGNORE, ATTITUDE_IGNORE = 0x20, 0x40, 0x80
 
 _OFFSET_FRAMES = (mav.MAV_FRAME_LOCAL_OFFSET_NED, mav.MAV_FRAME_BODY_OFFSET_NED, mav.MAV_FRAME_BODY_FRD)
@@ -85,7 +85,7 @@ class OffboardService:
 
     def _submit(self, peer: "Peer", m: Any, position: Vec3, velocity: Vec3, yaw: float = 0.0) -> None:
         mask = m.type_mask
-        if mask & FORCE_SET:
+        if mask & FORCE_SET and mask & ACCELERATION_IGNORE != ACCELERATION_IGNORE:  # else it qualifies nothing
             self._link.complain(peer, "Position target refused: forces are not supported, only accelerations")
             return
         now_us = self._link.vehicle.now_us

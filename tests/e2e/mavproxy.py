@@ -9,10 +9,9 @@ import threading
 import time
 from pathlib import Path
 
-from daemon_process import Daemon
-
 ANSWER_S = 30.0
 REPEAT_S = 6.0
+POLL_S = 0.5
 STANDARD_MODULES = (
     *("adsb", "arm", "auxopt", "battery", "calibration", "cmdlong", "fence", "ftp", "layout", "link", "log", "misc"),
     *("mode", "output", "param", "rally", "rc", "relay", "signing", "terrain", "tuneopt", "wp"),
@@ -20,11 +19,11 @@ STANDARD_MODULES = (
 
 
 class MavProxy:
-    """Connected to a daemon's port for ground stations; the state folder is its own."""
+    """Connected to a UDP port; the folder is its home."""
 
-    def __init__(self, daemon: Daemon, folder: Path) -> None:
+    def __init__(self, port: int, folder: Path) -> None:
         program = Path(sysconfig.get_path("scripts")) / "mavproxy.py"
-        master = f"udpout:127.0.0.1:{18570 + daemon.instance}"
+        master = f"udpout:127.0.0.1:{port}"
         self._process = subprocess.Popen(
             [sys.executable, str(program), "--master", master, "--no-state", "--nowait", "--streamrate", "2"],
             stdin=subprocess.PIPE,
@@ -35,7 +34,6 @@ class MavProxy:
             cwd=folder,
             env={**os.environ, "HOME": str(folder), "PYTHONUNBUFFERED": "1"},
         )
-        self._daemon = daemon
         self._said = ""
         self._read = 0  # up to here it was waited for
         self._news = threading.Condition()
@@ -61,7 +59,7 @@ class MavProxy:
             self._read = len(self._said)
         self._process.stdin.write(line + "\n")
 
-    def command(self, line: str, answer: str, *events: str) -> "re.Match[str]":
+    def command(self, line: str, answer: str, *events: str, repeat_s: float = REPEAT_S) -> "re.Match[str]":
         """Type a line, again if the answer stays away: datagrams get lost on a busy machine. Then wait for the events.
 
         Answer and events are regular expressions; returns the last one's match.
@@ -70,7 +68,7 @@ class MavProxy:
         while True:
             self.type(line)
             try:
-                found = self.hear(answer, REPEAT_S)
+                found = self.hear(answer, repeat_s)
                 break
             except AssertionError:
                 if time.monotonic() > end_s:
@@ -78,6 +76,10 @@ class MavProxy:
         for event in events:
             found = self.hear(event)
         return found
+
+    def poll(self, line: str, answer: str) -> None:
+        """Type a line until it shows what it should."""
+        self.command(line, answer, repeat_s=POLL_S)
 
     def hear(self, pattern: str, limit_s: float = ANSWER_S) -> "re.Match[str]":
         """What fits first in what it says from here on."""

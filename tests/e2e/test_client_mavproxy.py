@@ -31,10 +31,10 @@ def proxy(identity: str, tmp_path_factory) -> Iterator[MavProxy]:
     """Connected, with the parameters that it fetches by itself; shared by all tests of one identity."""
     folder = tmp_path_factory.mktemp("mavproxy")
     client = "MAVProxy" if identity == "px4" else None
-    with recorded(client, folder, "--speed", "5", "--identity", identity) as daemon:
-        connected = MavProxy(daemon, folder)
+    with recorded(client, folder, "--speed", "5", "--identity", identity) as running:
+        connected = MavProxy(running.port, folder)
         try:
-            connected.hear(f"online system {daemon.instance + 1}")
+            connected.hear(f"online system {running.instance + 1}")
             connected.hear(r"^Received (\d+) parameters")
             yield connected
         finally:
@@ -44,7 +44,7 @@ def proxy(identity: str, tmp_path_factory) -> Iterator[MavProxy]:
 def wait_for_mode(proxy: MavProxy, identity: str, name: str, number: int) -> None:
     """MAVProxy's prompt shows its own name for a mode where it takes the vehicle for a PX4, else the number."""
     prompt = name if identity == "px4" else rf"Mode\({number}\)"
-    proxy.command("status HEARTBEAT", rf"{prompt}> .*custom_mode : {number}\b")
+    proxy.poll("status HEARTBEAT", rf"{prompt}> .*custom_mode : {number}\b")
 
 
 def test_all_modules_that_it_loads_by_itself_work(proxy: MavProxy) -> None:
@@ -58,17 +58,17 @@ def test_parameters_are_fetched_shown_and_set(proxy: MavProxy) -> None:
     total = int(proxy.command("param fetch", r"Requested parameter list", r"Received (\d+) parameters")[1])
     assert total > 70
     proxy.type("param set pos_x_p 1.25")  # it writes names in upper case
-    proxy.command("param show POS_X_P", r"POS_X_P +1\.25$")
+    proxy.poll("param show POS_X_P", r"POS_X_P +1\.25$")
 
 
 def test_whole_numbers_are_understood_from_a_px4_alone(proxy: MavProxy, identity: str) -> None:
     """They travel bytewise, as AUTOPILOT_VERSION says; MAVProxy goes by the autopilot's name and doesn't ask."""
     if identity == "px4":
         proxy.type("param set COM_OBL_RC_ACT 4")
-        proxy.command("param show COM_OBL_RC_ACT", r"COM_OBL_RC_ACT +4$")
+        proxy.poll("param show COM_OBL_RC_ACT", r"COM_OBL_RC_ACT +4$")
     else:
         proxy.command("param set COM_OBL_RC_ACT 4", r"Failed to set COM_OBL_RC_ACT to 4")
-        proxy.command("param show COM_OBL_RC_ACT", r"COM_OBL_RC_ACT +7\.0\d+e-45$")
+        proxy.poll("param show COM_OBL_RC_ACT", r"COM_OBL_RC_ACT +7\.0\d+e-45$")
 
 
 def test_modes_by_name_are_beyond_it_and_by_number_they_are_not(proxy: MavProxy, identity: str) -> None:
@@ -101,7 +101,7 @@ def test_it_takes_off_flies_the_plan_lands_and_disarms(proxy: MavProxy, identity
     proxy.command("arm throttle", "COMPONENT_ARM_DISARM: ACCEPTED", "ARMED")
     proxy.command("takeoff 3", "NAV_TAKEOFF: DENIED", r"3\.0 m AMSL")  # above sea level, as for a PX4
     proxy.command(f"takeoff {HOME_AMSL_M + 3}", "NAV_TAKEOFF: ACCEPTED")
-    proxy.command("status GLOBAL_POSITION_INT", r"relative_alt : (29\d\d|30\d\d)\b")
+    proxy.poll("status GLOBAL_POSITION_INT", r"relative_alt : (29\d\d|30\d\d)\b")
     wait_for_mode(proxy, identity, "LOITER", 50593792)
     proxy.command("guided 55.69853 37.3595 193", "DO_REPOSITION: ACCEPTED")
     proxy.command("setspeed 3", "DO_CHANGE_SPEED: ACCEPTED")
@@ -109,6 +109,20 @@ def test_it_takes_off_flies_the_plan_lands_and_disarms(proxy: MavProxy, identity
     proxy.command("pause", "DO_PAUSE_CONTINUE: ACCEPTED")
     wait_for_mode(proxy, identity, "LOITER", 50593792)
     proxy.command("resume", "DO_PAUSE_CONTINUE: ACCEPTED", "waypoint 3", "DISARMED")
+
+
+def test_fences_and_rally_points_are_loaded_and_listed(proxy: MavProxy, tmp_path) -> None:
+    fence, rally = tmp_path / "fence.txt", tmp_path / "rally.txt"
+    corners = ((55.70, 37.36), (55.70, 37.35), (55.69, 37.35), (55.69, 37.36))
+    lines = [f"{k}\t0\t0\t5001\t4\t0\t0\t0\t{lat}\t{lon}\t0\t1" for k, (lat, lon) in enumerate(corners)]
+    fence.write_text("\n".join(["QGC WPL 110", *lines, ""]))
+    rally.write_text("QGC WPL 110\n0\t0\t3\t5100\t0\t0\t0\t0\t55.6985\t37.3596\t4\t1\n")
+    proxy.command(f"fence load {fence}", "TYPE_FENCE: ACCEPTED")
+    proxy.command("fence list", "Requesting 4 fence items", r"5001 0 55\.69")
+    proxy.command("fence clear", "TYPE_FENCE: ACCEPTED")
+    proxy.command(f"rally load {rally}", "TYPE_RALLY: ACCEPTED")
+    proxy.command("rally list", "Requesting 1 rally items", r"5100 3 55\.6985")
+    proxy.command("rally clear", "TYPE_RALLY: ACCEPTED")
 
 
 def test_the_rest_of_its_questions_are_answered(proxy: MavProxy) -> None:

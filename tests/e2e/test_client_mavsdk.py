@@ -1,6 +1,7 @@
 """MAVSDK, both generations, flying the real daemon over UDP: what its users' scripts do."""
 
 import asyncio
+import contextlib
 import math
 from collections.abc import Iterator
 
@@ -23,9 +24,9 @@ def drone(request, tmp_path_factory) -> Iterator[tuple[asyncio.Runner, Drone]]:
     half a second of simulation is soon over.
     """
     generation, folder = request.param, tmp_path_factory.mktemp("mavsdk")
-    own = ("--speed", str(SPEED), "--set", "COM_OF_LOSS_T=20")
-    with recorded(generation.value, folder, *own) as daemon, asyncio.Runner() as runner:
-        connection = Drone.connected(generation, f"udpout://127.0.0.1:{14580 + daemon.instance}")
+    own = ("--speed", str(SPEED), "--set", "COM_OF_LOSS_T=20", "--record", str(folder / "flights"))
+    with recorded(generation.value, folder, *own, onboard=True) as running, asyncio.Runner() as runner:
+        connection = Drone.connected(generation, f"udpout://127.0.0.1:{running.port}")
         yield runner, runner.run(connection.__aenter__())
         runner.run(connection.__aexit__(None, None, None))
 
@@ -162,6 +163,46 @@ async def test_a_mission_is_uploaded_read_back_flown_and_followed(drone: Drone) 
 
 
 @flown
+async def test_offboard_flies_to_positions_and_at_velocities(drone: Drone) -> None:
+    await drone.airborne()
+    types = drone.types("offboard")
+    await drone.offboard.set_position_ned(types.PositionNedYaw(2.0, 1.0, -4.0, 0.0))
+    await drone.offboard.start()
+    assert await drone.offboard.is_active()
+    await drone.mode("OFFBOARD")
+    await drone.told("position_velocity_ned", lambda m: math.dist(ned(m.position), (2.0, 1.0, -4.0)) < 0.2)
+
+    await drone.offboard.set_velocity_ned(types.VelocityNedYaw(0.0, 1.0, 0.0, 0.0))
+    await drone.told("velocity_ned", lambda v: abs(v.east_m_s - 1.0) < 0.1 and abs(v.north_m_s) < 0.1)
+    await drone.offboard.set_velocity_body(types.VelocityBodyYawspeed(1.0, 0.0, 0.0, 0.0))
+    await drone.told("velocity_ned", lambda v: abs(v.north_m_s - 1.0) < 0.1)  # it faces north
+    position, velocity = types.PositionNedYaw(0.0, 0.0, -4.0, 0.0), types.VelocityNedYaw(0.0, 0.0, 0.0, 0.0)
+    await drone.offboard.set_position_velocity_ned(position, velocity)
+    await drone.told("position_velocity_ned", lambda m: math.dist(ned(m.position), (0.0, 0.0, -4.0)) < 0.2)
+    await drone.offboard.stop()
+    await drone.mode("HOLD")
+
+
+def ned(position) -> tuple[float, float, float]:
+    return position.north_m, position.east_m, position.down_m
+
+
+@flown
+async def test_a_geofence_is_taken_and_read_back(drone: Drone) -> None:
+    types, here = drone.types("geofence"), await drone.told("position")
+    corners = ((1, 1), (1, -1), (-1, -1), (-1, 1))
+    points = [types.Point(here.latitude_deg + n * 1e-3, here.longitude_deg + e * 1e-3) for n, e in corners]
+    centre = types.Point(here.latitude_deg, here.longitude_deg)
+    inside = types.FenceType.INCLUSION
+    fence = types.GeofenceData([types.Polygon(points, inside)], [types.Circle(centre, 90.0, inside)])
+    await drone.geofence.upload_geofence(fence)
+    back = await drone.geofence.download_geofence()
+    assert [round(p.latitude_deg, 7) for p in back.polygons[0].points] == [round(p.latitude_deg, 7) for p in points]
+    assert [c.radius for c in back.circles] == [90.0]
+    await drone.geofence.clear_geofence()
+
+
+@flown
 async def test_it_returns_lands_and_disarms_by_itself(drone: Drone) -> None:
     await drone.airborne()
     await drone.action.return_to_launch()
@@ -171,3 +212,15 @@ async def test_it_returns_lands_and_disarms_by_itself(drone: Drone) -> None:
     landed = drone.types("telemetry").LandedState
     await drone.told("landed_state", lambda state: state == landed.ON_GROUND)
     await drone.told("armed", lambda armed: not armed)
+
+
+@flown
+async def test_the_flight_is_among_the_logs(drone: Drone) -> None:
+    errors = drone.types("log_files")
+    for _ in range(60):  # it is written out after disarming
+        with contextlib.suppress(errors.LogFilesError):
+            entries = await drone.log_files.get_entries()
+            if any(entry.size_bytes > 0 for entry in entries):
+                return
+        await asyncio.sleep(0.5)
+    raise AssertionError("no log of the flight")

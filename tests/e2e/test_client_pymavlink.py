@@ -9,7 +9,7 @@ import time
 from collections.abc import Iterator
 
 import pytest
-from recorded import recorded
+from recorded import Running, recorded
 
 os.environ.setdefault("MAVLINK20", "1")
 from pymavlink import mavftp, mavparm, mavutil, mavwp
@@ -24,10 +24,13 @@ SET_MODE, START = mavutil.mavlink.MAV_CMD_DO_SET_MODE, mavutil.mavlink.MAV_CMD_M
 ARM, REBOOT = mavutil.mavlink.MAV_CMD_COMPONENT_ARM_DISARM, mavutil.mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
 
 
-def connect(instance: int) -> mavutil.mavudp:
+def connect(running: Running) -> mavutil.mavudp:
     """As a script does: a connection that knows its vehicle."""
-    link = mavutil.mavlink_connection(f"udpout:127.0.0.1:{14580 + instance}", dialect="common", source_system=250)
-    until(lambda: (beat(link), link.wait_heartbeat(timeout=0.5), link.target_system == instance + 1)[-1], "heartbeat")
+    link = mavutil.mavlink_connection(f"udpout:127.0.0.1:{running.port}", dialect="common", source_system=250)
+    until(
+        lambda: (beat(link), link.wait_heartbeat(timeout=0.5), link.target_system == running.instance + 1)[-1],
+        "heartbeat",
+    )
     link.mav.request_data_stream_send(*target(link), mavutil.mavlink.MAV_DATA_STREAM_ALL, 4, 1)
     return link
 
@@ -43,14 +46,15 @@ def until(condition, what: str) -> None:
 
 
 @pytest.fixture(scope="module")
-def running(tmp_path_factory) -> Iterator:
-    with recorded("pymavlink", tmp_path_factory.mktemp("pymavlink"), "--speed", str(SPEED)) as daemon:
-        yield daemon
+def running(tmp_path_factory) -> Iterator[Running]:
+    folder = tmp_path_factory.mktemp("pymavlink")
+    with recorded("pymavlink", folder, "--speed", str(SPEED), onboard=True) as running:
+        yield running
 
 
 @pytest.fixture(scope="module")
 def shared(running) -> Iterator[mavutil.mavudp]:
-    with contextlib.closing(connect(running.instance)) as link:
+    with contextlib.closing(connect(running)) as link:
         yield link
 
 
@@ -213,17 +217,17 @@ def test_signed_it_is_obeyed_and_unsigned_it_is_not(tmp_path) -> None:
     key = bytes(range(32))
     (tmp_path / "key").write_bytes(key)
     own = ("--signing-key", str(tmp_path / "key"), "--speed", str(SPEED))
-    with recorded(None, tmp_path, *own) as daemon:
-        with contextlib.closing(connect(daemon.instance)) as stranger:  # HEARTBEAT is for everybody
+    with recorded(None, tmp_path, *own, onboard=True) as running:
+        with contextlib.closing(connect(running)) as stranger:  # HEARTBEAT is for everybody
             stranger.arducopter_arm()
             assert stranger.recv_match(type="COMMAND_ACK", blocking=True, timeout=2.0) is None
-        with contextlib.closing(connect(daemon.instance)) as link:
+        with contextlib.closing(connect(running)) as link:
             link.setup_signing(key)
             assert acknowledged(link, ARM, link.arducopter_arm) == ACCEPTED
             link.motors_armed_wait()
             assert acknowledged(link, ARM, link.arducopter_disarm) == ACCEPTED
             link.motors_disarmed_wait()
-        with contextlib.closing(connect(daemon.instance)) as forger:
+        with contextlib.closing(connect(running)) as forger:
             forger.setup_signing(bytes(32), allow_unsigned_callback=lambda *_: True)
             forger.arducopter_arm()
             assert forger.recv_match(type="COMMAND_ACK", blocking=True, timeout=2.0) is None

@@ -231,6 +231,16 @@ def test_reposition_without_any_position_is_a_pause(world: World) -> None:
     assert world.vehicle.commander.mode is Mode.HOLD
 
 
+@pytest.mark.parametrize("unset", [0.0, NAN])
+def test_loitering_nowhere_in_particular_is_hold(world: World, unset: float) -> None:
+    station = world.station()
+    station.ask(mav.MAV_CMD_DO_SET_MODE, 1, 4, 5)
+    assert station.ask(mav.MAV_CMD_NAV_LOITER_UNLIM, *(unset,) * 7) == [
+        ACCEPTED
+    ]  # as scripts send it, on the ground too
+    assert world.vehicle.commander.mode is Mode.HOLD
+
+
 def test_reposition_with_an_altitude_alone_keeps_the_place(world: World) -> None:
     station = world.station()
     world.take_off(station)

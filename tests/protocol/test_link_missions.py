@@ -278,6 +278,18 @@ def test_an_empty_plan_comes_down_as_a_count_of_nothing(world: World) -> None:
     assert station.all("MISSION_COUNT")[0].count == 0
 
 
+def test_a_count_of_nothing_is_not_repeated_for_those_who_do_not_acknowledge_it(world: World) -> None:
+    station = world.station()
+    world.vehicle.mission.replace(plan(3))
+    station.send("MISSION_REQUEST_LIST", target_system=1, target_component=1)
+    world.step()
+    world.vehicle.mission.replace(())
+    station.forget()
+    station.send("MISSION_REQUEST_LIST", target_system=1, target_component=1)
+    world.run(2.0)
+    assert [m.count for m in station.all("MISSION_COUNT")] == [0]
+
+
 def test_a_download_repeats_its_last_word_until_it_is_given_up(world: World) -> None:
     station = world.station()
     world.vehicle.mission.replace(plan(3))

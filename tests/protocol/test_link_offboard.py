@@ -162,6 +162,12 @@ def test_forces_are_refused(world: World) -> None:
     assert any("forces" in text for text in world.stations[0].texts())
 
 
+def test_a_force_that_is_ignored_is_none(world: World) -> None:
+    velocity_only = target(world, **FIELDS, type_mask=0xFC7)  # as MAVProxy's `velocity` sends it
+    assert not any(math.isnan(v) for v in velocity_only.velocity_N)
+    assert all(math.isnan(a) for a in velocity_only.acceleration_N)
+
+
 def test_a_target_that_ignores_everything_is_refused_and_explained(world: World) -> None:
     assert target(world, **FIELDS, type_mask=EVERYTHING) is None
     assert any("ignores everything" in text for text in world.stations[0].texts())
