@@ -13,6 +13,7 @@ from benchmarks.figure import Figure, show
 
 NAMES = {
     "tracking": "both flights by both vehicles against the paper's errors; 2.5 min, 10 s with --quick",
+    "robustness": "model errors, wind, recovery, turns and steps, in lockstep; a minute, 15 s with --quick",
     "speed": "simulated seconds per second, without the link and with it",
     "process": "a whole `sitl fly` process",
     "start": "process start to first heartbeat and to arming",

@@ -27,6 +27,13 @@ def at_most(what: str, values: Sequence[float], limit: float, unit: str) -> Figu
     return Figure(what, f"≤ {limit:g} {unit}", spread(values, unit), statistics.median(values) <= limit)
 
 
+def all_at_most(what: str, values: Sequence[float], limit: float, unit: str) -> Figure:
+    """The greatest of `values` against its upper limit."""
+    several = f" (least {_number(min(values))} of {len(values)})" if len(values) > 1 else ""
+    measured = f"{_number(max(values))} {unit}".rstrip() + several
+    return Figure(what, f"≤ {limit:g} {unit}".rstrip(), measured, max(values) <= limit)
+
+
 def at_least(what: str, values: Sequence[float], limit: float, unit: str) -> Figure:
     """The median of `values` against its lower limit."""
     return Figure(what, f"≥ {limit:g} {unit}", spread(values, unit), statistics.median(values) >= limit)

@@ -220,6 +220,13 @@ class Vehicle:
         return self._controller is not None and self._controller.estimating > 0.0
 
     @property
+    def controller(self) -> Controller:
+        """All constants of the onboard side, from the parameters in force."""
+        self._build_constants()
+        assert self._controller is not None
+        return self._controller
+
+    @property
     def loop(self) -> LoopState:
         """Everything of plant and cascade that changes while flying."""
         return loop_of(self._loop_array)

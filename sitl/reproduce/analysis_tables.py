@@ -8,10 +8,13 @@ import numpy as np
 from gcs_tools.metrics import AIRBORNE_M
 from sitl.reproduce.cases import ABLATIONS, MISSIONS
 from sitl.reproduce.evaluation import Evaluation
+from sitl.reproduce.linear import READINGS
+from sitl.reproduce.loops import HOMES
 from sitl.reproduce.printed import AXES
-from sitl.reproduce.tables import Cell, Group, Row, Table, millimetres, number
+from sitl.reproduce.tables import Cell, Group, Row, Table, millimetres, number, told
 
 _COLUMNS = (*AXES, "max |φ| [°]")
+_KICK = "max |φ| in a 3 m step east [°]"
 
 
 def ablations(evaluation: Evaluation) -> Table:
@@ -22,11 +25,14 @@ def ablations(evaluation: Evaluation) -> Table:
         for vehicle in evaluation.ablated:
             for mission in MISSIONS:
                 cells += _cells(evaluation, f"{a.key}@{vehicle}", mission)
+            cells.append(number(evaluation.kicks[a.key, vehicle], 2))
         rows.append(Row(a.title, cells, "" if before is not None and before.group == a.group else a.group))
-    missing = [Cell("—")] * (len(_COLUMNS) * len(MISSIONS) * (len(evaluation.ablated) - 1))
     literal = [cell for mission in MISSIONS for cell in _cells(evaluation, "literal", mission)]
+    groups = []
+    for vehicle in evaluation.ablated:
+        groups += [*(Group(f"{vehicle}, {mission}", _COLUMNS) for mission in MISSIONS), Group(vehicle, (_KICK,))]
+    missing = [Cell("—")] * (sum(len(group.columns) for group in groups) - len(literal))
     rows.append(Row("yawsitter-literal", [*literal, *missing], "airframe"))
-    groups = [Group(f"{vehicle}, {mission}", _COLUMNS) for vehicle in evaluation.ablated for mission in MISSIONS]
     return Table("ablations", "Ablations: mean absolute error of the true position [mm]", groups, rows)
 
 
@@ -44,7 +50,7 @@ def readings(loops: list[dict[str, Any]]) -> Table:
     for line in loops:
         real, imaginary = line["worst_pole_1_s"]
         stable = line["stable"]
-        pole = f"{real:.3g}" + (f" ± {abs(imaginary):.3g}j" if abs(imaginary) > 1e-9 else "")
+        pole = _pole(real) + (f" ± {_pole(abs(imaginary))}j" if abs(imaginary) > 1e-9 else "")
         part = f"{line['gains']} gains, {line['actuators']} actuators"
         rows.append(
             Row(
@@ -52,7 +58,7 @@ def readings(loops: list[dict[str, Any]]) -> Table:
                 [
                     number(line["rate_hz"], 0),
                     Cell("stable" if stable else "unstable", float(stable), stable),
-                    Cell(pole.replace("-", "−"), real),
+                    Cell(pole, real),
                     Cell(_innermost(line["unstable_loops"])),
                 ],
                 part if part != last else "",
@@ -61,6 +67,10 @@ def readings(loops: list[dict[str, Any]]) -> Table:
         last = part
     columns = ("control rate [Hz]", "whole loop", "slowest or worst pole [1/s]", "innermost loop that is unstable")
     return Table("readings", "Readings of M_des, linearised in hover", [Group("", columns)], rows)
+
+
+def _pole(value: float) -> str:
+    return f"{value:.3g}".replace("-", "−") if abs(value) < 1000.0 else told(value, 0)
 
 
 def _innermost(unstable: list[str]) -> str:
@@ -100,4 +110,29 @@ def _margins(loop: dict[str, Any]) -> list[Cell]:
 def _speed(value: float) -> Cell:
     if not math.isfinite(value):
         return Cell("—")
-    return Cell(f"{value:.3g}", value)
+    return number(value, 2 if value < 10.0 else 1 if value < 100.0 else 0)
+
+
+def limits_table(evaluation: Evaluation) -> Table:
+    """What physics sets, beside what each gain set asks of it."""
+    x = evaluation.limits
+    speeds = [_north(evaluation, gains, actuators) for gains, _, actuators in HOMES]
+    rows = [
+        Row(
+            "flaps to north [rad/s]", [number(x["unstable_zero_1_s"], 1), *speeds], "unstable zero; velocity loop's ω_c"
+        ),
+        Row("thrust to weight", [number(x["thrust_to_weight"], 2), Cell("—"), Cell("—")], "saturation"),
+    ]
+    for name in ("roll", "pitch", "yaw"):
+        asked = [number(x[f"{name}_saturates_deg_{gains}"], 1) for gains, _, _ in HOMES]
+        heading = "greatest angular acceleration in hover [rad/s²]; the angle that asks for it all [°]"
+        rows.append(Row(name, [number(x[f"{name}_rad_s2"], 0), *asked], heading if name == "roll" else ""))
+    columns = ("limit", *(f"{gains} gains, {actuators} actuators" for gains, _, actuators in HOMES))
+    return Table("limits", "Limits that no gains move, and how near the loops go", [Group("", columns)], rows)
+
+
+def _north(evaluation: Evaluation, gains: str, actuators: str) -> Cell:
+    line = next(
+        x for x in evaluation.loops if (x["gains"], x["actuators"], x["reading"]) == (gains, actuators, READINGS[0])
+    )
+    return _speed(next(x for x in line["loops"] if (x["loop"], x["axis"]) == ("velocity", "north"))["crossover_rad_s"])

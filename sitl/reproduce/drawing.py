@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 FEEDBACK, FEEDFORWARD, EXACT, TUNED, REFERENCE = "#d55e00", "#0072b2", "#cc79a7", "#009e73", "#333333"
-COLOURS = {"feedback": FEEDBACK, "feedforward": FEEDFORWARD, "exact": EXACT, "tuned": TUNED}
+COLOURS = {"feedback": FEEDBACK, "feedforward": FEEDFORWARD, "printed": FEEDFORWARD, "exact": EXACT, "tuned": TUNED}
 _STYLE: dict[Any, Any] = {
     "font.size": 9.0,
     "axes.titlesize": 10.0,

@@ -14,7 +14,6 @@ from sitl.frames import quaternion_to_yxz
 from sitl.model.propulsion import thrust
 from sitl.reproduce.cases import Case
 from sitl.vehicle import Vehicle, load_vehicle, with_airframe
-from sitl.vehicle_spec import VehicleSpec
 
 Array = NDArray[np.float64]
 HERE = Path(__file__).parent
@@ -72,15 +71,17 @@ def mission(name: str) -> Streamed:
     return plan
 
 
-def vehicle_spec(name: str) -> VehicleSpec:
-    """A bundled vehicle, or one of this package's own files."""
-    return load_vehicle(str(HERE / name) if name.endswith(".yaml") else name)
-
-
 def fly(case: Case) -> Flight:
     """Fly one case from standing to standing. Raises FlightError where it fails on the way."""
-    spec, believed = with_airframe(vehicle_spec(case.vehicle), dict(case.plant), dict(case.believed))
-    vehicle = _Recorded(spec, seed=case.seed, overrides=dict(case.overrides), believed_airframe=believed)
+    spec, believed = with_airframe(load_vehicle(case.vehicle), dict(case.plant), dict(case.believed))
+    vehicle = _Recorded(
+        spec,
+        seed=case.seed,
+        wind_N=case.wind_N,
+        gust_m_s=case.gust_m_s,
+        overrides=dict(case.overrides),
+        believed_airframe=believed,
+    )
     plan = mission(case.mission)
     flown = lockstep.fly(plan, vehicle)
     flight = flown.flight

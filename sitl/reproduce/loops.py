@@ -22,7 +22,7 @@ from sitl.vehicle import Vehicle, load_vehicle
 Array = NDArray[np.float64]
 IDEAL = Actuators(0.0, 0.0)
 OFF = Bandwidth(0.0, 0.0)
-_SETS = (("paper", "yawsitter"), ("tuned", "yawsitter-real"))
+HOMES = (("paper", "yawsitter", "ideal"), ("tuned", "yawsitter-real", "real"))  # gains, whose, made for which actuators
 _GRID = 500
 _LOWEST_RAD_S = 0.02
 _MARGINAL_1_S = 1e-3  # a pole no faster than this is an integrator's, within the accuracy of the differences
@@ -147,7 +147,7 @@ def analyse() -> list[dict[str, Any]]:
     """Every gain set with ideal and with real actuators, by every reading; the unstable ones at faster rates too."""
     lines = []
     real = load_vehicle("yawsitter-real").actuators
-    for gains, home in _SETS:
+    for gains, home, _ in HOMES:
         for actuators, lag in (("ideal", IDEAL), ("real", real)):
             d = design(home, lag)
             at = hover(design(home, IDEAL))
@@ -160,6 +160,19 @@ def analyse() -> list[dict[str, Any]]:
                     faster = d._replace(dt_s=1.0 / rate)
                     lines.append(analysed(faster, hover(design(home, IDEAL, rate)), gains, actuators, reading))
     return lines
+
+
+def shapes() -> dict[str, dict[str, Array]]:
+    """By gain set and loop of the chain that moves the vehicle north: rows ω [rad/s] and |L|."""
+    found = {}
+    for gains, home, _ in HOMES:
+        d = design(home)
+        linear = linearised(d, hover(design(home, IDEAL)))
+        w = grid(linear.dt_s)
+        axes = (1, 1, 0, 0)  # pitch, then north
+        loops = zip(CASCADES, axes, strict=True)
+        found[gains] = {c.loop: np.vstack((w, np.abs(open_loop(linear, d.gains, c, k, w)))) for c, k in loops}
+    return found
 
 
 def unstable_zero() -> float:

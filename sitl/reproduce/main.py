@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import Any
 
 from gcs_tools import results
-from sitl.reproduce import flight_figures, model_figures, output
+from sitl.reproduce import beyond, flight_figures, model_figures, output
 from sitl.reproduce.drawing import Drawn, Plot, drawn
 from sitl.reproduce.evaluation import Evaluation, evaluate
 from sitl.reproduce.fly import FlightError
@@ -54,6 +54,8 @@ def plots(evaluation: Evaluation) -> list[Plot]:
         *flight_figures.plots(evaluation),
         model_figures.coefficient_plot(),
         model_figures.pole_plot(evaluation.loops),
+        model_figures.loops_plot(evaluation.shapes, evaluation.limits["unstable_zero_1_s"]),
+        *beyond.plots(evaluation),
     ]
 
 
@@ -66,7 +68,7 @@ def summary(evaluation: Evaluation) -> list[str]:
         "lockstep, through its MAVLink link; columns headed “paper” are print. ✓ marks a cell at or below print, ✗ "
         "one above it.",
         "x, y, z are north, east, down. Errors are measured minus reference. “True” is the plant's own position; “as "
-        "it reports it” is what comes over the link, with the navigation's error in it.",
+        "it reports it” is the filter's estimate of it, which comes over the link.",
         f"{'Quick: seed' if evaluation.quick else 'Seeds'} {', '.join(map(str, evaluation.seeds))}; {versions}.",
     ]
 
@@ -94,7 +96,8 @@ def main(args: argparse.Namespace) -> int:
             figures = _draw(plots(evaluation), bar)
     except FlightError as error:
         return _complain(str(error), 1)
-    tables, remarks = all_tables(evaluation), notes(evaluation)
+    tables = [*all_tables(evaluation), beyond.table(evaluation)]
+    remarks = notes(evaluation)
     html = page(tables, figures, remarks, output.commands(evaluation), summary(evaluation))
     try:
         output.write(folder, evaluation, tables, figures, remarks, html)

@@ -8,14 +8,26 @@ from sitl.frames import GRAVITY_M_S2
 from sitl.model.airframe import Airframe
 from sitl.model.propulsion import wake_speed
 from sitl.model.trim import solve
-from sitl.reproduce.cases import MISSIONS, VIEWS
+from sitl.reproduce import beyond
+from sitl.reproduce.cases import ABLATIONS, MISSIONS, VIEWS
 from sitl.reproduce.evaluation import Evaluation
 from sitl.reproduce.fly import Flight
 from sitl.reproduce.printed import AXES, OVERALL, ROWS
 from sitl.reproduce.tables import ROUNDING, figures, score, told, tracking
 from sitl.vehicle_spec import load_vehicle
 
-Notes = dict[str, list[str]]  # by Table.key or Plot.key
+Notes = dict[str, list[str]]  # by Table.key
+_MARGINS = (
+    "ω_c: the highest frequency at which |L| = 1, ω_B: where the closed loop has lost 3 dB, both in rad/s; GM: gain "
+    "margin in dB; PM: phase margin in degrees; max |S|: the greatest sensitivity. Each loop is closed around those "
+    "inside it, and cut at its own measurement. The disturbance observer is left out throughout."
+)
+_LIMITS = (
+    "The zero: a flap that pitches the nose forward pushes the vehicle backward first; no gain moves it, and a loop "
+    "north faster than about half of it answers the wrong way for longer than it has time. Saturation: beyond the "
+    "angles given the printed or tuned gains ask for all that flaps or propellers have, and the loop is no longer the "
+    "one of these tables."
+)
 _LEG_S, _LEGS_M, _LEG_PEAK_M_S = 10.0, (5.0, 10.0), 20.0 / 10.0 * 15.0 / 8.0
 _CIRCLE_LEAST_N = 12.526  # printed
 
@@ -33,6 +45,9 @@ def notes(evaluation: Evaluation) -> Notes:
         ],
         "ablations": _ablations(evaluation),
         "readings": _readings(evaluation),
+        "limits": [_LIMITS],
+        "margins-paper-ideal": [_MARGINS],
+        "trials": beyond.notes(evaluation),
     }
 
 
@@ -80,7 +95,7 @@ def _tracking(evaluation: Evaluation, mission: str) -> list[str]:
         "At or below print: " + "; ".join(f"{title}: {good} of {count} cells" for title, good, count in scores) + ".",
         "Errors are compared by size: the paper doesn't say which way it subtracts. Its “max overshoot” is compared "
         "with the largest |error|, the greatest that an overshoot can be. Single instants are a matter of luck: "
-        "print has some below a millimetre, less than a noisy position of 3 mm can tell. The overall figures are the "
+        "print has some below a millimetre, less than any receiver can tell. The overall figures are the "
         "ones to compare.",
     ]
 
@@ -94,8 +109,8 @@ def _seeds(evaluation: Evaluation) -> str:
     parts = [f"{m} {worst('true', m)} mm true and {worst('reported', m)} mm reported" for m in MISSIONS]
     return (
         f"Greatest MAE x / y / z over seeds {', '.join(map(str, evaluation.seeds))}: {'; '.join(parts)}. The true "
-        "position is the plant's; the reported one is what a ground station records, and contains the navigation's "
-        "own error (3 mm of position, correlated over 0.1 s; 2 cm/s, 3 mrad and 0.01 rad/s drive the vehicle besides)."
+        "position is the plant's; the reported one is the filter's estimate, which is all that a ground station hears "
+        "of. The loop holds the estimate to the reference, so its slow errors show in the true position alone."
     )
 
 
@@ -198,25 +213,22 @@ def _ablations(evaluation: Evaluation) -> list[str]:
 
 
 def _coupling(evaluation: Evaluation) -> list[str]:
-    def turn(key: str, vehicle: str) -> float:
-        flights = [evaluation.flight(f"{key}@{vehicle}", m) for m in MISSIONS]
-        return float(max(max(abs(v) for v in f.true["ranges"]["roll_deg"]) for f in flights))
-
     said = []
     for vehicle in evaluation.ablated:
+        told = {a.key: f"{evaluation.kicks[a.key, vehicle]:.2f}°" for a in ABLATIONS if not a.overrides}
         said.append(
-            f"{vehicle}: the heading turns by {turn('as-is', vehicle):.3f}° at most with both compensated, "
-            f"{turn('torque-unknown', vehicle):.3f}° without the reaction torque, {turn('wake-unknown', vehicle):.3f}° "
-            f"without the unequal slipstreams, {turn('both-unknown', vehicle):.3f}° without either in the allocation"
+            f"{vehicle} {told['as-is']} as it is, {told['torque-unknown']} where the allocation doesn't know the "
+            f"torque, {told['wake-unknown']} where it doesn't know the slipstreams, {told['both-unknown']} where it "
+            f"knows neither, {told['both-absent']} where there is neither"
         )
     return [
-        "Reaction torque and unequal slipstreams both roll the vehicle about its thrust axis when the thrusts differ, "
-        f"so they show in φ and hardly in the position. {'; '.join(said)}."
+        "Reaction torque and unequal slipstreams both roll the vehicle about its thrust axis when the thrusts differ. "
+        "These gentle flights don't show it; a bare step of 3 m east does. Its heading turns by at most: "
+        f"{'; '.join(said)}. The two pull opposite ways, so that leaving one out can help by chance."
     ]
 
 
 def _readings(evaluation: Evaluation) -> list[str]:
-    limits = evaluation.limits
     a, gains = _airframe(), load_vehicle("yawsitter").gains
     inertia = {"P": a.jxx_kg_m2, "Q": a.jyy_kg_m2, "R": a.jzz_kg_m2}
     rates = [
@@ -232,10 +244,4 @@ def _readings(evaluation: Evaluation) -> list[str]:
         "M_des = J⁻¹ × bracket makes the rate loops' gain K = K_p (1 + K_d) / J², with the attitude loop's K_d, "
         "which acts on the same rates; sampled, their poles 1 − K h leave the unit circle below K / 2 = "
         f"{', '.join(rates)}. Above the greatest of them it is stable, with ideal actuators.",
-        f"What no gain moves: a zero at +{limits['unstable_zero_1_s']:.1f} 1/s from the flaps to north, because a "
-        "flap that pitches the nose forward pushes the vehicle backward first; it keeps the north loop below about "
-        "half of that.",
-        f"Saturation: thrust to weight {limits['thrust_to_weight']:.2f}; greatest angular accelerations in hover "
-        f"{limits['roll_acceleration_rad_s2']:.0f} (roll), {limits['pitch_acceleration_rad_s2']:.0f} (pitch) and "
-        f"{limits['yaw_acceleration_rad_s2']:.0f} rad/s² (yaw).",
     ]

@@ -10,21 +10,28 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from sitl.reproduce.cases import SETUPS
+from sitl.reproduce.cases import BEYOND, SETUPS
 from sitl.reproduce.drawing import Drawn
 from sitl.reproduce.evaluation import Evaluation
 from sitl.reproduce.fly import COLUMNS, HERE
 from sitl.reproduce.notes import Notes
 from sitl.reproduce.printed import KEY_ERRORS, OVERALL
 from sitl.reproduce.tables import Table, as_rows, score
+from sitl.reproduce.trials import TRIALS, command
 
 _PACKAGES = ("yawsitter-sitl", "numpy", "numba")
 _DRAWN_FLIGHTS = tuple(setup.key for setup in SETUPS)
 
 
 def commands(evaluation: Evaluation) -> list[str]:
-    """The command line of every flight, each once."""
-    return list(dict.fromkeys(flight.case.command for flight in evaluation.flights.values()))
+    """The command line of every flight and trial, each once."""
+    trials = [
+        command(trial.key, setup.craft, seed)
+        for setup in BEYOND
+        for trial in TRIALS
+        for seed in evaluation.seeds[: len(evaluation.trials[trial.key, setup.key])]
+    ]
+    return list(dict.fromkeys([*(flight.case.command for flight in evaluation.flights.values()), *trials]))
 
 
 def versions() -> dict[str, str]:
@@ -54,6 +61,20 @@ def numbers(evaluation: Evaluation, tables: Sequence[Table], notes: Notes) -> di
             for name, flight in evaluation.flights.items()
         },
         "scores": {t.key: [list(s) for s in score(t)] for t in tables if score(t)},
+        "trials": [
+            {
+                "trial": trial.key,
+                "measure": measure.title,
+                "unit": measure.unit,
+                "aim": measure.limit,
+                "vehicle": setup.vehicle,
+                "set": dict(setup.overrides),
+                "by_seed": [values[k] for values in evaluation.trials[trial.key, setup.key]],
+            }
+            for trial in TRIALS
+            for k, measure in enumerate(trial.measures)
+            for setup in BEYOND
+        ],
         "trims": evaluation.trims,
         "limits": evaluation.limits,
         "loops": evaluation.loops,

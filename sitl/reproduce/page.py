@@ -23,12 +23,8 @@ _SECTIONS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("Paths in space", ("paths",)),
     ("Coefficients", ("coefficients",)),
     ("Ablations", ("ablations",)),
-    ("Loop analysis", ("readings", "poles", "margins-")),
-)
-_MARGINS = (
-    "ω_c: the highest frequency at which |L| = 1, ω_B: where the closed loop has lost 3 dB, both in rad/s; GM: gain "
-    "margin in dB; PM: phase margin in degrees; max |S|: the greatest sensitivity. Each loop is closed around those "
-    "inside it, and cut at its own measurement."
+    ("Loop analysis", ("readings", "poles", "loops", "limits", "margins-")),
+    ("Beyond the paper", ("trials", "steps", "recoveries")),
 )
 
 
@@ -36,8 +32,7 @@ def page(
     tables: Sequence[Table], figures: Sequence[Drawn], notes: Notes, commands: Sequence[str], summary: Sequence[str]
 ) -> str:
     """The whole page. summary: what is said first; commands: how each flight is flown again."""
-    said = {t.key: [_MARGINS] if t.key.startswith("margins-") else notes.get(t.key, []) for t in tables}
-    parts = {**{t.key: _table(t, said[t.key]) for t in tables}, **{d.plot.key: _figure(d) for d in figures}}
+    parts = {**{t.key: _table(t, notes.get(t.key, [])) for t in tables}, **{d.plot.key: _figure(d) for d in figures}}
     sections = []
     for title, wanted in _SECTIONS:
         keys = [key for w in wanted for key in parts if key == w or (w.endswith("-") and key.startswith(w))]

@@ -10,7 +10,7 @@ from sitl.reproduce.printed import AXES, KEY_ERRORS, OVERALL, RANGES, ROWS
 ROUNDING = 0.00005  # of the printed tables, in their units
 SOURCES = {
     "true": "errors of the true position at key times and overall",
-    "reported": "the same of the position that the noisy vehicle reports",
+    "reported": "the same of the position that the vehicle reports",
 }
 
 
@@ -171,7 +171,7 @@ def trims(evaluation: Evaluation) -> Table:
 
 
 def all_tables(evaluation: Evaluation) -> list[Table]:
-    from sitl.reproduce.analysis_tables import ablations, margins_table, readings
+    from sitl.reproduce.analysis_tables import ablations, limits_table, margins_table, readings
 
     return [
         overview(evaluation),
@@ -181,6 +181,7 @@ def all_tables(evaluation: Evaluation) -> list[Table]:
         trims(evaluation),
         ablations(evaluation),
         readings(evaluation.loops),
+        limits_table(evaluation),
         *margins_table(evaluation.loops),
     ]
 

@@ -87,6 +87,23 @@ def test_its_commands_fly_the_very_same_flights(report: Report, name: str) -> No
     assert again == flight["reported"]
 
 
+def test_its_trials_are_flown_again_by_their_commands(report: Report) -> None:
+    trial = next(
+        t for t in report.printed["trials"] if (t["trial"], t["measure"], t["set"]) == ("step-y", "overshoot", {})
+    )
+    command = f"python -m sitl.reproduce.trials step-y {trial['vehicle']} 1"
+    assert command in (report.folder / "commands.txt").read_text().splitlines()
+    words = [sys.executable, *shlex.split(command)[1:]]
+    done = subprocess.run(words, cwd=report.folder, capture_output=True, text=True, timeout=LIMIT_S)
+    assert done.stdout.splitlines()[0] == f"step-y, overshoot: {trial['by_seed'][0]:.6g} %"
+
+
+def test_what_is_aimed_at_beyond_the_paper_is_met_where_the_state_is_known(report: Report) -> None:
+    known = [t for t in report.printed["trials"] if t["set"] == {"EST_ENABLE": 0.0}]
+    assert len(known) == 17
+    assert [t for t in known if max(t["by_seed"]) > t["aim"]] == []
+
+
 def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_flown(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     done = sitl("reproduce", "--out", "file/report", folder=tmp_path)
