@@ -11,33 +11,25 @@ from sitl.control.guidance import Guidance
 from sitl.control.reference import rest_at
 from sitl.geodesy import GeoPoint
 from sitl.navigation import NavState
-from sitl.onboard import arming, ground
-from sitl.onboard.battery import BatteryWatch, Level
+from sitl.onboard import arming
 from sitl.onboard.events import EventLog
-from sitl.onboard.executor import Executor, Progress
-from sitl.onboard.feasibility import Feasibility
-from sitl.onboard.following import Following
+from sitl.onboard.flight import FACING, Flight
 from sitl.onboard.footing import Footing
 from sitl.onboard.gaze import Gaze, Look
-from sitl.onboard.guide import Fix, Guide
+from sitl.onboard.guide import Fix
 from sitl.onboard.guided import Guided
-from sitl.onboard.homing import Homing, Stage
-from sitl.onboard.landing import Landing
 from sitl.onboard.mission import MissionState
 from sitl.onboard.modes import ACCEPTED, EventKind, Landed, Mode, Outcome, Severity, Verdict
 from sitl.onboard.offboard import Offboard
 from sitl.onboard.parameters import Parameters
 from sitl.onboard.plans import Plans
-from sitl.onboard.sticks import Sticks
-from sitl.onboard.takeoff import Takeoff
 from sitl.onboard.transitions import AFTER, ENTRY, LOSSES, Happening, after
+from sitl.onboard.watch import Watch
 from sitl.quaternion import Vec3
 
 __all__ = ["AFTER", "ENTRY", "Commander", "Happening"]
 
-_TERMINATE, _KEEP_GAZE = 4.0, {(Mode.TAKEOFF, Mode.HOLD)}
 _ASKED_WRONGLY = (Mode.OFFBOARD, Mode.ORBIT)  # a refusal is the request's fault, not the moment's
-_FACING = (Mode.TAKEOFF, Mode.HOLD, Mode.ORBIT, Mode.MISSION)  # modes in which the gaze counts
 
 
 class Commander:
@@ -59,18 +51,19 @@ class Commander:
         self.failsafe = ""
         self.changed = True
         self.home_heading_rad = heading_rad
-        guide = self._guide = Guide(parameters, heading_rad)
-        self.gaze = Gaze()
-        self._landing = Landing(parameters, guide)
-        self._takeoff = Takeoff(parameters, guide, places, self.geofence)
-        self._following = Following(offboard, guide)
-        self._homing = Homing(parameters, guide, self._landing, plans)
-        self._sticks = Sticks(parameters)
-        self._executor = Executor(mission, parameters, events, guide, places, self.gaze, self.set_home)
-        self.guided = Guided(guide, self.geofence, self.gaze, self._switch, lambda: self.armed and not self.standing)
-        self._feasibility = Feasibility(plans)
-        self._battery = BatteryWatch(parameters)
-        self._footing = Footing(guide, events)
+        self._flight = Flight(
+            parameters,
+            plans,
+            offboard,
+            events,
+            heading_rad,
+            enter=self._switch,
+            flying=lambda: self.armed and not self.standing,
+            set_home=self.set_home,
+        )
+        self._guide = self._flight.guide
+        self._footing = Footing(self._guide, events)
+        self._watch = Watch(parameters, plans, events, self._happened)
         self._terminated = False
         self._fix = Fix.at_rest(0, heading_rad)
         self._stations_lost = False
@@ -89,6 +82,15 @@ class Commander:
     @property
     def home_N(self) -> Vec3:
         return self._places.home_N
+
+    @property
+    def guided(self) -> Guided:
+        """What can be flown on request in Hold and Orbit."""
+        return self._flight.guided
+
+    @property
+    def gaze(self) -> Gaze:
+        return self._flight.gaze
 
     @property
     def standing(self) -> bool:
@@ -115,12 +117,15 @@ class Commander:
         self.observe(now_us, nav, feet_down)
         self.changed = False
         self._watch_tilt()
-        self._watch_plans()
+        self._watch.mission(self._fix, self.armed and self.mode is Mode.MISSION)
         if self.armed:
-            self._MODES[self.mode](self)
-            self._face()
+            happening = self._flight.tick(self.mode, self._fix)
+            if happening is not None:
+                self._happened(happening)
+            self._flight.face(self.mode, self._fix)
             self._watch_ground()
-            self._watch_fence()
+            if self._watch.fence(self._fix, not self.standing):
+                self.terminate()
         else:
             self._footing.rest(feet_down)
         self.guidance = self._guidance()
@@ -129,12 +134,6 @@ class Commander:
     def _guidance(self) -> Guidance:
         guide, aloft = self._guide, 0.0 if self._fix.feet_down > 0 else 1.0
         return Guidance(int(self._footing.effort), guide.trajectory, *guide.follow, aloft, guide.steering)
-
-    def _face(self) -> None:
-        if self.mode in _FACING and not self.standing:
-            bearing = self.gaze.bearing(self._guide.reference(self._fix))
-            if bearing is not None or self._guide.faced:
-                self._guide.face(self._fix, bearing)
 
     # requests
 
@@ -185,7 +184,7 @@ class Commander:
 
     def takeoff(self, altitude_amsl_m: float | None = None, heading_rad: float | None = None) -> Outcome:
         """Climb to an altitude (None: MIS_TAKEOFF_ALT above home), now or as soon as armed."""
-        outcome = self._takeoff.ask(altitude_amsl_m, heading_rad)
+        outcome = self._flight.takeoff.ask(altitude_amsl_m, heading_rad)
         if not outcome.ok:
             self._tell(Severity.WARNING, outcome.reason)
             return outcome
@@ -218,7 +217,7 @@ class Commander:
 
     def face(self, point_N: Vec3) -> Outcome:
         """Turn toward a place, and keep facing it until the mode changes."""
-        if self.mode not in _FACING:
+        if self.mode not in FACING:
             return Outcome(Verdict.TEMPORARILY_REJECTED, f"there is nothing to face in {self.mode.value}")
         self.gaze.at(Look.POINT, point_N)
         return ACCEPTED
@@ -238,7 +237,7 @@ class Commander:
 
     def manual(self, x: float, y: float, z: float, r: float) -> None:
         """Sticks, −1 … 1: forward, right, up, clockwise; they fly in Position mode."""
-        self._sticks.submit((x, y, z, r), self._fix.now_us)
+        self._flight.sticks.submit((x, y, z, r), self._fix.now_us)
 
     def terminate(self) -> Outcome:
         """Stop the motors for good, wherever the vehicle is."""
@@ -266,14 +265,9 @@ class Commander:
         self.mode, self.armed, self.failsafe = Mode.HOLD, False, ""
         self._terminated, self.changed = False, True
         self._footing.restart()
-        self._battery.restart()
+        self._watch.restart()
         self._fix = Fix.at_rest(self._fix.now_us, heading_rad)
-        self._takeoff.forget()
-        self._sticks.centre()
-        self.guided.leave()
-        self.gaze.forget()
-        self._guide.speed_m_s = None
-        self._guide.put(rest_at(0.0, 0.0, 0.0, heading_rad))
+        self._flight.restart(heading_rad)
         self.guidance = self._guidance()
 
     # modes
@@ -282,11 +276,7 @@ class Commander:
         self.changed = True
         self.guided.leave()
         if mode is not self.mode:
-            if self.mode is Mode.MISSION:
-                self._executor.leave()
-            if (self.mode, mode) not in _KEEP_GAZE:
-                self.gaze.forget()
-            self._guide.speed_m_s = None
+            self._flight.leave(self.mode, mode)
             self.mode = mode
             self.failsafe = ""
             self._events.add(EventKind.MODE, Severity.INFO, mode.value)
@@ -294,61 +284,8 @@ class Commander:
             self._begin(mode)
 
     def _begin(self, mode: Mode) -> None:
-        """Put the first trajectory of a mode in force."""
-        fix, guide = self._fix, self._guide
         self._footing.stand_anew()
-        if mode in (Mode.HOLD, Mode.POSITION, Mode.ORBIT):
-            guide.stop(fix)
-            self._sticks.centre()
-        elif mode is Mode.TAKEOFF:
-            self._takeoff.start(fix)
-        elif mode is Mode.LAND:
-            self._landing.start(fix)
-        elif mode is Mode.RETURN:
-            self._homing.start(fix)
-        elif mode is Mode.MISSION:
-            self._executor.start(fix)
-        elif mode is Mode.OFFBOARD:
-            self._following.start()
-
-    def _tick_position(self) -> None:
-        if self._sticks.lost(self._fix.now_us):
-            self._happened(Happening.STICKS_LOST)
-        elif self._sticks.deflected or not self.standing:
-            self._sticks.tick(self._fix, self._guide)
-
-    def _tick_takeoff(self) -> None:
-        if self._guide.done(self._fix) and not self.standing:
-            self._happened(Happening.HEIGHT_REACHED)
-
-    def _tick_mission(self) -> None:
-        progress = self._executor.tick(self._fix)
-        if progress is Progress.COMPLETE and not (self.standing and self._executor.landing):
-            self._happened(Happening.MISSION_COMPLETE)
-        elif progress is Progress.RETURN:
-            self._happened(Happening.RETURN_ITEM)
-
-    def _tick_orbit(self) -> None:
-        self.guided.tick(self._fix)
-        if self.guided.orbiting is None:
-            self._happened(Happening.ORBIT_COMPLETE)
-
-    def _tick_offboard(self) -> None:
-        if self._offboard.lost(self._fix.now_us):
-            self._happened(Happening.TARGETS_LOST)
-        else:
-            self._following.tick(self._fix)
-
-    _MODES: dict[Mode, Callable[["Commander"], None]] = {  # noqa: RUF012
-        Mode.HOLD: lambda self: self.guided.tick(self._fix),
-        Mode.ORBIT: _tick_orbit,
-        Mode.POSITION: _tick_position,
-        Mode.TAKEOFF: _tick_takeoff,
-        Mode.LAND: lambda self: self._landing.tick(self._fix),
-        Mode.RETURN: lambda self: self._homing.tick(self._fix),
-        Mode.MISSION: _tick_mission,
-        Mode.OFFBOARD: _tick_offboard,
-    }
+        self._flight.begin(mode, self._fix)
 
     def _happened(self, happening: Happening, detail: str = "") -> None:
         """Go where AFTER points; with a detail it is told even where it points nowhere."""
@@ -367,22 +304,13 @@ class Commander:
 
     def _watch_ground(self) -> None:
         """Decide between idling on the ground and flying; disarm after a landing."""
-        fix, landing = self._fix, self._is_landing()
-        lifting = self._following.lifting if self.mode is Mode.OFFBOARD else None
-        down = self._footing.watch(fix, ground.Intent(self.mode is Mode.TAKEOFF, landing, lifting))
-        if down and landing:
+        fix, intent = self._fix, self._flight.intent(self.mode)
+        if self._footing.watch(fix, intent) and intent.landing:
             heading = self._guide.reference(fix).heading_rad
             self._guide.put(rest_at(fix.nav.north_m, fix.nav.east_m, 0.0, heading))
-        finished = landing or (self.mode is Mode.MISSION and self._mission.state is MissionState.COMPLETE)
+        finished = intent.landing or (self.mode is Mode.MISSION and self._mission.state is MissionState.COMPLETE)
         if self.standing and finished and self._footing.standing_s(fix.now_us) >= self._p["COM_DISARM_LAND"]:
             self._disarm()
-
-    def _is_landing(self) -> bool:
-        return (
-            self.mode is Mode.LAND
-            or (self.mode is Mode.RETURN and self._homing.stage is Stage.LAND)
-            or (self.mode is Mode.MISSION and self._executor.landing)
-        )
 
     def _watch_tilt(self) -> None:
         """Stop the motors of a vehicle that lies on the ground."""
@@ -391,38 +319,9 @@ class Commander:
             if self.armed:
                 self._disarm()
 
-    def _watch_fence(self) -> None:
-        outside = self.geofence.breach.outside
-        violation = self.geofence.watch(self._fix, not self.standing, self._p["MPC_ACC_HOR"])
-        if self.geofence.breach.outside is not outside:
-            self._events.add(EventKind.FENCE, Severity.INFO, "")
-        if violation is None:
-            return
-        self._happened(Happening.FENCE_BREACHED, violation.reason)
-        if self._p["GF_ACTION"] == _TERMINATE:
-            self.terminate()
-
-    def _watch_plans(self) -> None:
-        """Tell of a mission that leaves the fence when either changes, and don't fly it on."""
-        objection = self._feasibility.news(self._fix.position_N)
-        if not objection:
-            return
-        if self.armed and self.mode is Mode.MISSION:
-            self._happened(Happening.MISSION_OUTSIDE, objection)
-        else:
-            self._tell(Severity.WARNING, f"mission can't be started: {objection}")
-
     def watch_battery(self, remaining: float) -> None:
         """Told by the vehicle how full its battery is, 0 … 1."""
-        level = self._battery.watch(remaining)
-        if level is None or not self.armed:
-            return
-        if level is Level.LOW:
-            self._tell(Severity.WARNING, f"battery low: {100.0 * remaining:.0f} %")
-        else:
-            critical = level is Level.CRITICAL
-            happening = Happening.BATTERY_CRITICAL if critical else Happening.BATTERY_EMERGENCY
-            self._happened(happening, f"{100.0 * remaining:.0f} %")
+        self._watch.battery(remaining, self.armed)
 
     def _disarm(self) -> None:
         self.armed = False
@@ -440,7 +339,7 @@ class Commander:
 
 _CONDITIONS: dict[str, Callable[[Commander], str]] = {
     "has_mission": lambda c: "" if c._mission.items else "there is no mission",
-    "mission_inside": lambda c: c._feasibility.objection(c._fix.position_N),
+    "mission_inside": lambda c: c._watch.mission_objection(c._fix),
     "asked_to_orbit": lambda c: "" if c.mode is Mode.ORBIT else "it takes a centre and a radius: command DO_ORBIT",
     "targets_alive": lambda c: (
         f"no target in the last {c._p['COM_OF_LOSS_T']:g} s" if c._offboard.lost(c._fix.now_us) else ""
