@@ -38,37 +38,51 @@ _CIRCLES = (FenceCommand.CIRCLE_INCLUSION, FenceCommand.CIRCLE_EXCLUSION)
 _INCLUSIONS = (FenceCommand.POLYGON_INCLUSION, FenceCommand.CIRCLE_INCLUSION)
 
 
+class Sides(NamedTuple):
+    """A polygon's sides as lines north = n + slope (east − e), each between its own east and that of its end."""
+
+    north_m: NDArray[np.float64]
+    east_m: NDArray[np.float64]
+    end_east_m: NDArray[np.float64]
+    slope: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, corners: Sequence[tuple[float, float]]) -> "Sides":
+        n, e = np.array(corners).T
+        n2, e2 = np.roll(n, 1), np.roll(e, 1)
+        across = e2 != e  # a side along the ray to the north is never crossed by it
+        return cls(n, e, e2, np.where(across, (n2 - n) / np.where(across, e2 - e, 1.0), 0.0))
+
+    def around(self, north_m: float, east_m: float) -> bool:
+        """Whether a place lies inside, by how often a ray from it to the north crosses the sides."""
+        reached = (self.east_m > east_m) != (self.end_east_m > east_m)
+        beyond = self.north_m + self.slope * (east_m - self.east_m) > north_m
+        return bool(np.count_nonzero(reached & beyond) % 2)
+
+
 class Area(NamedTuple):
-    """A polygon (radius 0) or a circle (one corner, its centre), level, in N [m]; `item` is the index of its first."""
+    """A polygon (its sides) or a circle (centre and radius), level, in N [m]; `item` is the index of its first."""
 
     item: int
     inclusion: bool
     group: int
-    corners: NDArray[np.float64]  # (corners, 2): north, east
-    radius_m: float
+    sides: Sides | None
+    centre_N: tuple[float, float] = (0.0, 0.0)
+    radius_m: float = 0.0
 
     def contains(self, north_m: float, east_m: float) -> bool:
-        """Whether a place lies inside; for polygons by how often a ray to the north crosses the sides."""
-        if self.radius_m > 0.0:
-            centre = self.corners[0]
-            return math.hypot(north_m - centre[0], east_m - centre[1]) < self.radius_m
-        n, e = self.corners[:, 0], self.corners[:, 1]
-        n2, e2 = np.roll(n, 1), np.roll(e, 1)
-        sides = (e > east_m) != (e2 > east_m)
-        n, e, n2, e2 = n[sides], e[sides], n2[sides], e2[sides]
-        return bool(np.count_nonzero(north_m < (n2 - n) * (east_m - e) / (e2 - e) + n) % 2)
+        if self.sides is not None:
+            return self.sides.around(north_m, east_m)
+        return math.dist((north_m, east_m), self.centre_N) < self.radius_m
 
     def violated(self, north_m: float, east_m: float) -> bool:
         return self.contains(north_m, east_m) is not self.inclusion
 
     @property
     def reason(self) -> str:
-        what = "circle" if self.radius_m > 0.0 else "polygon"
-        return (
-            f"outside the {what} of fence item {self.item}"
-            if self.inclusion
-            else (f"inside the forbidden {what} of fence item {self.item}")
-        )
+        what = "circle" if self.sides is None else "polygon"
+        where = f"outside the {what}" if self.inclusion else f"inside the forbidden {what}"
+        return f"{where} of fence item {self.item}"
 
 
 class Fence(Plan):
@@ -122,10 +136,10 @@ class Fence(Plan):
             item = items[k]
             count = int(item.param1) if item.command in _POLYGONS else 1
             if item.command != FenceCommand.RETURN_POINT:
-                corners = np.array([self._places.of(i, (0.0, 0.0, 0.0))[:2] for i in items[k : k + count]])
-                radius = item.param1 if item.command in _CIRCLES else 0.0
                 group = 0 if math.isnan(item.param2) else int(item.param2)
-                areas.append(Area(k, item.command in _INCLUSIONS, group, corners, radius))
+                corners = [self._places.of(i, (0.0, 0.0, 0.0))[:2] for i in items[k : k + count]]
+                sides = Sides.of(corners) if item.command in _POLYGONS else None
+                areas.append(Area(k, item.command in _INCLUSIONS, group, sides, corners[0], item.param1))
             k += count
         return areas
 
