@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from onboard_flights import NAN, SPECS, after, hovering, item, of_kind, place, reached, standing, texts, wait
 
-from sitl.frames import heading
+from sitl.frames import heading, wrap_pi
 from sitl.geodesy import to_global
 from sitl.onboard.mission import MissionState
 from sitl.onboard.mission_items import ItemCommand as C
@@ -383,3 +383,80 @@ def test_an_item_without_autocontinue_waits_for_someone_to_go_on() -> None:
     assert (reached(vehicle), vehicle.mission.current) == ([0], 0)
     vehicle.mission.set_current(1)
     wait(vehicle, lambda v: v.commander.mode is Mode.HOLD, 30.0)
+
+
+# items beyond the plain ones
+
+
+def test_loiter_to_altitude_goes_to_its_place_and_height_and_keeps_the_heading() -> None:
+    vehicle = hovering()
+    flown((item(C.LOITER_TO_ALT, (4.0, 3.0, -6.0), p1=1.0, p4=1.0),), vehicle=vehicle)
+    assert place(vehicle) == pytest.approx((4.0, 3.0, -6.0), abs=0.3)
+    assert heading_of(vehicle) == pytest.approx(0.0, abs=0.02)
+
+
+def heading_of(vehicle: Vehicle) -> float:
+    n = vehicle.snapshot().nav
+    return heading(n.qw, n.qx, n.qy, n.qz)
+
+
+def test_the_exit_flag_of_a_loiter_is_no_heading() -> None:
+    vehicle = hovering()
+    flown((item(C.LOITER_TIME, (2.0, 0.0, -3.0), p1=1.0, p4=1.0),), vehicle=vehicle)
+    assert heading_of(vehicle) == pytest.approx(0.0, abs=0.01)
+
+
+def flown_corner(command: C) -> tuple[float, float]:
+    """Least speed near the corner of a right angle, and how far from it the vehicle passes."""
+    plan = (item(command, (10.0, 0.0, -3.0)), item(C.WAYPOINT, (10.0, 10.0, -3.0)))
+    vehicle = hovering()
+    assert vehicle.mission.replace(plan) is None
+    assert vehicle.commander.start_mission().ok
+    slowest, nearest = math.inf, math.inf
+
+    def watch(v: Vehicle) -> None:
+        nonlocal slowest, nearest
+        n, e, _ = place(v)
+        nearest = min(nearest, math.hypot(n - 10.0, e))
+        if math.hypot(n - 10.0, e) < 2.0:
+            s = v.snapshot().nav
+            slowest = min(slowest, math.hypot(s.v_north_m_s, s.v_east_m_s))
+
+    after(vehicle, 25.0, watch)
+    assert place(vehicle)[:2] == pytest.approx((10.0, 10.0), abs=0.3)
+    return slowest, nearest
+
+
+def test_a_spline_takes_a_corner_at_speed_where_straight_legs_all_but_stop() -> None:
+    straight, spline = flown_corner(C.WAYPOINT), flown_corner(C.SPLINE_WAYPOINT)
+    assert straight[0] < 0.6
+    assert spline[0] > 1.0
+    assert spline[1] < 0.5
+
+
+def test_a_turn_item_goes_its_way_at_its_rate() -> None:
+    vehicle = hovering()
+    plan = (item(C.CONDITION_YAW, p1=90.0, p2=30.0, p3=-1.0, p4=0.0), item(C.DELAY, p1=1.0))
+    assert vehicle.mission.replace(plan) is None
+    assert vehicle.commander.start_mission().ok
+    turned, last = 0.0, heading_of(vehicle)
+
+    def watch(v: Vehicle) -> None:
+        nonlocal turned, last
+        turned, last = turned + wrap_pi(heading_of(v) - last), heading_of(v)
+        assert abs(v.snapshot().reference.heading_rate_rad_s) < math.radians(31.5)
+
+    after(vehicle, 19.0, watch)
+    assert math.degrees(turned) == pytest.approx(-270.0, abs=2.0)
+
+
+def test_a_transition_to_forward_flight_is_refused_and_says_that_there_is_none() -> None:
+    fault = standing().mission.replace((item(C.DO_VTOL_TRANSITION, p1=4.0),))
+    assert (fault.index, fault.field) == (0, "param1")
+    assert "no forward flight" in fault.reason
+
+
+@pytest.mark.parametrize("mode", [1.0, 2.0, 4.0])
+def test_only_a_location_can_be_faced(mode: float) -> None:
+    fault = standing().mission.replace((item(C.DO_SET_ROI, (1.0, 1.0, -1.0), p1=mode, p4=0.0),))
+    assert (fault.index, fault.field) == (0, "param1")
