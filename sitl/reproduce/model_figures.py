@@ -55,7 +55,6 @@ def coefficient_plot() -> Plot:
         "Solid: what the plant's forces come to, referred to the wing's area. Dashed: the printed linear sums, in "
         "which a flap of 0.02 m² acts as if it had the wing's 0.088 m²; that is why the flaps' effect is smaller here. "
         "C_D of deflected flaps leans over because their force stands on the chord, not on the flow. "
-        "C_D of deflected flaps leans over because their force stands on the chord, not on the flow. "
         "The paper gives its curves as a figure without numbers, so there is no error to state."
     )
     return Plot("coefficients", "C_m, C_L and C_D over α for least, zero and greatest flap", note, (10.5, 3.6), draw)
