@@ -41,10 +41,8 @@ class Outcome(NamedTuple):
 def measure(quick: bool) -> Iterator[Figure]:
     count = COUNT // 20 if quick else COUNT
     flights = [hover(seed, min(FLIGHT, count)) for seed in range(1, max(1, count // FLIGHT) + 1)]
-    sent = sum(flight.datagrams for flight in flights)
-    yield told(
-        "hostile datagrams to a hovering vehicle", f"{sent}; {sum(f.left_out for f in flights)} obeyable left out"
-    )
+    sent, left_out = sum(flight.datagrams for flight in flights), sum(flight.left_out for flight in flights)
+    yield told("hostile datagrams to a hovering vehicle", f"{sent}; {left_out} that it must obey left out")
     yield at_most("  farthest from its place", [max(flight.drift_m for flight in flights)], DRIFT_M, "m")
     changed = sorted({name for flight in flights for name in flight.changed})
     yield at_most("  parameters or plan changed", [len(changed)], 0, f"({', '.join(changed)})" if changed else "")
