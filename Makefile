@@ -5,7 +5,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 READY  := $(VENV)/ready
 
-.PHONY: run test bench lint setup clean
+.PHONY: run test bench docs lint setup clean
 
 run: $(READY)
 	@$(BIN)/python -m gcs_tools.demo
@@ -20,6 +20,11 @@ test: $(READY)
 
 bench: $(READY)
 	@$(BIN)/python -m benchmarks
+
+# what real clients say and are answered, and the tables in docs/link.md that are made of it
+docs: $(READY)
+	@CONFORMANCE_WRITE=1 $(BIN)/python -m pytest tests/e2e/test_client_*.py
+	@$(BIN)/python -m conformance
 
 setup: $(READY)
 

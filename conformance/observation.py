@@ -4,6 +4,7 @@ Only what a client chose to say is kept, and as sets: counts and order differ fr
 """
 
 from collections.abc import Iterable
+from typing import Any
 
 import msgspec
 
@@ -39,7 +40,9 @@ ANSWERS: dict[str, tuple[str, ...]] = {
 }
 """By message: the messages one of which answers it. What is missing here is taken without an answer."""
 
-_SETTINGS = {mav.MAV_CMD_SET_MESSAGE_INTERVAL, mav.MAV_CMD_GET_MESSAGE_INTERVAL, mav.MAV_CMD_REQUEST_MESSAGE}
+Results = dict[str, set[str]]
+
+COMPONENT_INFORMATION = 395  # deprecated, and gone from pymavlink
 _REQUESTS = {
     mav.MAV_CMD_REQUEST_PROTOCOL_VERSION: "PROTOCOL_VERSION",
     mav.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: "AUTOPILOT_VERSION",
@@ -67,37 +70,39 @@ def observe(frames: Iterable[Frame], vehicle: int) -> Observation:
     """Reduce what passed, in its order, between the system `vehicle` and one client."""
     sent: set[str] = set()
     heard: set[str] = set()
-    results: tuple[dict[str, set[str]], ...] = ({}, {}, {})
-    asked: dict[int, tuple[dict[str, set[str]], str]] = {}
+    results: tuple[Results, Results, Results] = ({}, {}, {})
+    asked: dict[int, list[tuple[Results, str]]] = {}
     for frame in frames:
         name, m = frame.name, frame.message
         if frame.system != vehicle:
             sent.add(name)
             if name in ("COMMAND_LONG", "COMMAND_INT"):
-                asked[m.command] = _kind(results, m)
+                asked[m.command] = _entries(m, *results)
         else:
             heard.add(name)
-            if name == "COMMAND_ACK" and m.command in asked and m.result != mav.MAV_RESULT_IN_PROGRESS:
-                kind, what = asked[m.command]
-                kind.setdefault(what, set()).add(_result_name(m.result))
+            if name == "COMMAND_ACK" and m.result != mav.MAV_RESULT_IN_PROGRESS:
+                for kind, what in asked.get(m.command, ()):
+                    kind.setdefault(what, set()).add(_result_name(m.result))
     messages = {name: not (answers := ANSWERS.get(name)) or not heard.isdisjoint(answers) for name in sorted(sent)}
     commands, requests, rates = ({what: sorted(kind[what]) for what in sorted(kind)} for kind in results)
     return Observation(messages, commands, requests, rates)
 
 
-def _kind(results: tuple[dict[str, set[str]], ...], m: object) -> tuple[dict[str, set[str]], str]:
-    commands, requests, rates = results
-    command = m.command
-    if command in _REQUESTS:
-        return requests, _REQUESTS[command]
-    if command in _SETTINGS:
-        return rates if command != mav.MAV_CMD_REQUEST_MESSAGE else requests, _message_name(m.param1)
-    return commands, command_name(command)
+def _entries(m: Any, commands: Results, requests: Results, rates: Results) -> list[tuple[Results, str]]:
+    """Where the result of a command is to be entered: under its own name, and under that of the message it is about."""
+    entries = [(commands, command_name(m.command))]
+    if m.command in _REQUESTS:
+        entries.append((requests, _REQUESTS[m.command]))
+    elif m.command == mav.MAV_CMD_REQUEST_MESSAGE:
+        entries.append((requests, _message_name(m.param1)))
+    elif m.command == mav.MAV_CMD_SET_MESSAGE_INTERVAL:
+        entries.append((rates, _message_name(m.param1)))
+    return entries
 
 
 def _message_name(number: float) -> str:
     try:
-        return by_id(int(number)).name
+        return "COMPONENT_INFORMATION" if number == COMPONENT_INFORMATION else by_id(int(number)).name
     except (KeyError, ValueError, OverflowError):
         return f"{number:g}"
 

@@ -62,13 +62,15 @@ class Entry(NamedTuple):
     """One row of the table.
 
     used: the numbers of the parameters that may be set. place: param5 to 7 name one. query: a repetition is carried
-    out again, the message asked for may have been lost.
+    out again, the message asked for may have been lost. amsl: with PX4's identity an altitude in
+    MAV_FRAME_GLOBAL_RELATIVE_ALT is above the sea nevertheless: PX4 heeds no frame here, and MAVSDK relies on it.
     """
 
     handle: "Callable[[Link, Peer, Command], Reply]"
     used: str
     place: bool = False
     query: bool = False
+    amsl: bool = False
 
 
 def denied(reason: str) -> Reply:

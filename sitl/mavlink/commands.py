@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 from sitl.mavlink.actions import TABLE
 from sitl.mavlink.codec import Frame, mav, message
 from sitl.mavlink.command import UNSUPPORTED_FRAME, Command, Entry, Reply, denied, has_place
+from sitl.mavlink.identity import Identity
 from sitl.mavlink.mode_commands import set_custom_mode
 from sitl.mavlink.wire import INT32_UNSET, NAN
 from sitl.onboard.guided import Task
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 ANSWERS_MAX = 16  # remembered per peer
 ANSWER_VALID_S = 10.0  # wall time; a later repetition is a new command
 CANCELLED = 6  # MAV_RESULT_CANCELLED
+RELATIVE = mav.MAV_FRAME_GLOBAL_RELATIVE_ALT
 PROGRESS_S = 0.5  # wall time between two acknowledgements of a command under way
 _ENDED = {Task.State.DONE: mav.MAV_RESULT_ACCEPTED, Task.State.INTERRUPTED: mav.MAV_RESULT_FAILED}
 _LONG_REPEATED = slice(0, 32)  # COMMAND_LONG's payload without `confirmation`, its last byte
@@ -102,7 +104,10 @@ class CommandService:
             scale = 1e-4 if m.frame == mav.MAV_FRAME_LOCAL_NED else 1e-7
         x, y = (NAN if v == INT32_UNSET else v * scale for v in (m.x, m.y))
         params = (m.param1, m.param2, m.param3, m.param4, x, y, m.z)
-        self._answer(peer, frame, entry, Command(m.command, params, m.frame))
+        heeded = m.frame
+        if heeded == RELATIVE and entry is not None and entry.amsl and self._link.identity is Identity.PX4:
+            heeded = mav.MAV_FRAME_GLOBAL
+        self._answer(peer, frame, entry, Command(m.command, params, heeded))
 
     def on_cancel(self, peer: "Peer", frame: Frame) -> None:
         """COMMAND_CANCEL: the command's own acknowledgement tells that it has ended; one that is over is left alone."""

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 from sitl.mavlink import metadata
-from sitl.mavlink.codec import Frame, Parser, by_name, mav, message
+from sitl.mavlink.codec import Frame, Parser, by_id, by_name, mav, message
 from sitl.mavlink.commands import CommandService
 from sitl.mavlink.files import Area, Files, MemoryArea, Mount
 from sitl.mavlink.ftp import FtpService
@@ -376,6 +376,11 @@ class Endpoint:
     @on_frame.setter
     def on_frame(self, tap: Callable[[bytes, bool], None] | None) -> None:
         self._link.on_frame = tap
+
+    @property
+    def takes(self) -> tuple[str, ...]:
+        """Names of the messages that it acts on."""
+        return tuple(by_id(identity).name for identity in self._handlers)
 
     @property
     def shutdown_requested(self) -> bool:

@@ -195,11 +195,11 @@ COMMANDS: dict[int, Entry] = {
     mav.MAV_CMD_NAV_LOITER_TIME: Entry(_loiter_time, "1234567", place=True),
     mav.MAV_CMD_NAV_LOITER_TO_ALT: Entry(_loiter_to_altitude, "124567", place=True),
     mav.MAV_CMD_CONDITION_YAW: Entry(_turn, "1234"),
-    mav.MAV_CMD_DO_ORBIT: Entry(_orbit, "1234567", place=True),
+    mav.MAV_CMD_DO_ORBIT: Entry(_orbit, "1234567", place=True, amsl=True),
     mav.MAV_CMD_DO_REPOSITION: Entry(_reposition, "1234567", place=True),
     mav.MAV_CMD_DO_SET_ROI_LOCATION: Entry(_face, "1567", place=True),
     mav.MAV_CMD_DO_SET_ROI_NONE: Entry(_face_nothing, "1"),
     mav.MAV_CMD_DO_SET_ROI: Entry(_face_as_before, "1234567", place=True),
     mav.MAV_CMD_DO_CHANGE_SPEED: Entry(_change_speed, "123"),
-    mav.MAV_CMD_DO_SET_HOME: Entry(_set_home, "1234567", place=True),
+    mav.MAV_CMD_DO_SET_HOME: Entry(_set_home, "1234567", place=True, amsl=True),
 }

@@ -53,7 +53,7 @@ def send_message(link: "Link", peer: "Peer", message_id: int, detail: float) -> 
         for definition, payload in packed:
             link.send_packed(peer, definition, payload)
         return True
-    maker = _ONE_SHOT.get(message_id)
+    maker = ONE_SHOT.get(message_id)
     replies = maker(link, peer, int(detail) if math.isfinite(detail) else 0) if maker else []
     for reply in replies:
         link.send(peer, reply)
@@ -77,7 +77,7 @@ def _metadata(link: "Link", _peer: "Peer", _detail: int) -> list[Any]:
     return [link.metadata.message(link.vehicle.now_us)]
 
 
-_ONE_SHOT: dict[int, Callable[["Link", "Peer", int], list[Any]]] = {
+ONE_SHOT: dict[int, Callable[["Link", "Peer", int], list[Any]]] = {
     by_name("HEARTBEAT").id: lambda link, _peer, _detail: [vehicle_heartbeat(link)],
     by_name("AUTOPILOT_VERSION").id: lambda link, _peer, _detail: [autopilot_version(link.system_id)],
     by_name("PROTOCOL_VERSION").id: lambda _link, _peer, _detail: [protocol_version()],

@@ -16,6 +16,7 @@ from typing import Any
 
 from recorded import Running
 
+from conformance.observation import COMPONENT_INFORMATION
 from sitl.mavlink.codec import Encoder, Frame, Parser, by_name, mav, message
 from sitl.mavlink.ftp_payload import Error, Op, Packet
 
@@ -30,7 +31,6 @@ HASH_S = 1.0  # until the first value, which has to be _HASH_CHECK
 FTP_TRIES, FTP_S = 3, 1.0
 MODE_TRIES, MODE_S = 3, 1.3  # PX4FirmwarePlugin: 13 looks, a tenth of a second apart
 PARAMETER_METADATA = 1  # COMP_METADATA_TYPE
-COMPONENT_INFORMATION = 395  # deprecated, and gone from pymavlink
 CHANGE_MODE = mav.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
 
 

@@ -101,6 +101,17 @@ async def test_telemetry_comes_at_the_rate_that_was_set(drone: Drone) -> None:
 
 
 @flown
+async def test_home_is_set_above_the_sea(drone: Drone) -> None:
+    if drone.generation is Generation.GRPC:
+        pytest.skip("MAVSDK 3 can't")
+    start = await drone.told("home")
+    await drone.action.set_home(False, start.latitude_deg, start.longitude_deg, start.absolute_altitude_m - 1.0)
+    await drone.told("home", lambda home: abs(home.absolute_altitude_m - start.absolute_altitude_m + 1.0) < 0.01)
+    await drone.action.set_home(True, math.nan, math.nan, math.nan)
+    await drone.told("home", lambda home: abs(home.absolute_altitude_m - start.absolute_altitude_m) < 0.01)
+
+
+@flown
 async def test_it_takes_off_to_the_height_that_was_set(drone: Drone) -> None:
     await drone.action.set_takeoff_altitude(4.0)
     assert await drone.action.get_takeoff_altitude() == 4.0
@@ -115,14 +126,21 @@ async def test_it_takes_off_to_the_height_that_was_set(drone: Drone) -> None:
 
 
 @flown
-async def test_it_goes_where_it_is_told_and_faces_there(drone: Drone) -> None:
+async def test_it_goes_where_it_is_told_faces_there_and_circles(drone: Drone) -> None:
     start = await drone.airborne()
     goal = start.latitude_deg + 5.0 * METRE_DEG
     await drone.action.goto_location(goal, start.longitude_deg, start.absolute_altitude_m + 1.0, 90.0)
     await drone.told("position", lambda p: abs(p.latitude_deg - goal) < 0.2 * METRE_DEG)
     await drone.told("position", lambda p: abs(p.absolute_altitude_m - start.absolute_altitude_m - 1.0) < 0.2)
     await drone.told("heading", lambda heading: abs(heading.heading_deg - 90.0) < 3.0)
+    await drone.action.set_current_speed(3.0)
+    facing = drone.types("action").OrbitYawBehavior.HOLD_FRONT_TO_CIRCLE_CENTER
+    await drone.action.do_orbit(4.0, 2.0, facing, start.latitude_deg, start.longitude_deg, start.absolute_altitude_m)
+    await drone.told("velocity_ned", lambda v: abs(math.hypot(v.north_m_s, v.east_m_s) - 2.0) < 0.2)
+    height = (await drone.told("position")).absolute_altitude_m  # MAVSDK says above home and means above the sea
+    assert height == pytest.approx(start.absolute_altitude_m, abs=0.3)
     await drone.action.hold()
+    await drone.mode("HOLD")
 
 
 @flown
@@ -179,6 +197,15 @@ async def test_offboard_flies_to_positions_and_at_velocities(drone: Drone) -> No
     position, velocity = types.PositionNedYaw(0.0, 0.0, -4.0, 0.0), types.VelocityNedYaw(0.0, 0.0, 0.0, 0.0)
     await drone.offboard.set_position_velocity_ned(position, velocity)
     await drone.told("position_velocity_ned", lambda m: math.dist(ned(m.position), (0.0, 0.0, -4.0)) < 0.2)
+    here = await drone.told("position")
+    above = types.PositionGlobalYaw.AltitudeType.REL_HOME
+    await drone.offboard.set_position_global(
+        types.PositionGlobalYaw(here.latitude_deg, here.longitude_deg, 5.0, 0.0, above)
+    )
+    await drone.told("position", lambda p: abs(p.relative_altitude_m - 5.0) < 0.2)
+    await drone.offboard.set_attitude(types.Attitude(0.0, 0.0, 0.0, 0.5))
+    await asyncio.sleep(0.5)
+    assert await drone.offboard.is_active()
     await drone.offboard.stop()
     await drone.mode("HOLD")
 
@@ -200,6 +227,13 @@ async def test_a_geofence_is_taken_and_read_back(drone: Drone) -> None:
     assert [round(p.latitude_deg, 7) for p in back.polygons[0].points] == [round(p.latitude_deg, 7) for p in points]
     assert [c.radius for c in back.circles] == [90.0]
     await drone.geofence.clear_geofence()
+
+
+@flown
+async def test_folders_are_listed(drone: Drone) -> None:
+    listing = await drone.ftp.list_directory("/")
+    names = listing.dirs if drone.generation is Generation.GRPC else [entry.name for entry in listing.entries]
+    assert "metadata" in names
 
 
 @flown

@@ -9,8 +9,10 @@ from mavlink_pair import Station, Wire, World
 from sitl.geodesy import GeoPoint, to_global
 from sitl.mavlink.actions import TABLE
 from sitl.mavlink.codec import mav
+from sitl.mavlink.identity import Identity
 from sitl.onboard.modes import Landed, Mode
 from sitl.onboard.plan import MissionItem
+from sitl.vehicle_spec import VehicleSpec
 
 NAN = math.nan
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = range(5)
@@ -333,6 +335,19 @@ def test_home_is_set_here_or_there_and_told_at_once(world: World) -> None:
     assert station.ask(mav.MAV_CMD_DO_SET_HOME, 0, 0, 0, 0, NAN, NAN, NAN) == [DENIED]
     assert station.ask(mav.MAV_CMD_DO_SET_HOME, 0, 0, 0, 0, 95.0, 10.0, 0.0) == [DENIED]
     assert station.ask(mav.MAV_CMD_DO_SET_HOME, 7, 0, 0, 0, lat, lon, 0.0) == [DENIED]
+
+
+@pytest.mark.parametrize(
+    ("identity", "frame", "altitude_m"),
+    [(Identity.PX4, 3, 195.0), (Identity.PX4, 6, 385.0), (Identity.GENERIC, 3, 385.0)],
+)
+def test_mavsdk_s_home_above_the_sea_in_a_relative_frame_is_read_as_a_px4_does(
+    spec: VehicleSpec, identity: Identity, frame: int, altitude_m: float
+) -> None:
+    world = World(spec, identity=identity)
+    fields = {"x": 556_985_000, "y": 373_595_000, "z": 195.0, "frame": frame}
+    assert ask_int(world, world.station(), mav.MAV_CMD_DO_SET_HOME, **fields) == [ACCEPTED]
+    assert world.vehicle.commander.home.alt_amsl_m == pytest.approx(altitude_m)
 
 
 def test_prearm_checks_are_run_and_their_failure_told(world: World) -> None:
