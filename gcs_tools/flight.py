@@ -114,16 +114,17 @@ class Flight:
             raise LinkError("the flight never started")
         return self.recording.track(self.t0_s, self.plan.reference if isinstance(self.plan, Streamed) else None)
 
+    def key_points(self) -> list[tuple[float, Vector | None]]:
+        """When something was to be reached, and where; without a place it is the reference then."""
+        if isinstance(self.plan, Streamed):
+            return [(t, self.plan.reference.at(t).position_m) for t in self.plan.key_times_s]
+        return self.reached
+
     def metrics(self) -> Metrics:
         if self.measured_s is None:
             raise LinkError("the flight wasn't flown to its end")
-        if isinstance(self.plan, Streamed):
-            reference = self.plan.reference
-            points: list[tuple[float, Vector | None]] = [(t, reference.at(t).position_m) for t in self.plan.key_times_s]
-        else:
-            points = self.reached
         try:
-            return evaluate(self.track(), self.measured_s, points)
+            return evaluate(self.track(), self.measured_s, self.key_points())
         except TooFewSamplesError as error:
             raise LinkError(str(error)) from None
 

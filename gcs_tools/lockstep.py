@@ -7,8 +7,9 @@ time. So the same seed and settings give the same flight bit for bit, at whateve
 import argparse
 import math
 import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from gcs_tools import plan as plans
 from gcs_tools import results
@@ -21,11 +22,14 @@ from sitl.geodesy import GeoPoint
 from sitl.mavlink.endpoint import Endpoint, PortKind
 from sitl.strict_yaml import ConfigError
 from sitl.vehicle import DEFAULT_HOME, Vehicle, load_vehicle, with_airframe
+from sitl.vehicle_spec import VehicleSpec
 
 TURN_US = 20_000
 ADDRESS = ("127.0.0.1", 14540)
 LIMIT_S = 7200.0  # of simulation time: no flight takes so long, so one that does is a mistake
 _SHOW_EVERY = 64  # turns
+
+AnyVehicle = TypeVar("AnyVehicle", bound=Vehicle)
 
 
 class Flown(NamedTuple):
@@ -62,25 +66,23 @@ def fly(plan: Plan, vehicle: Vehicle, *, speed: float = math.inf, quiet: bool = 
     return Flown(flight, vehicle, (vehicle.now_us - start_us) * 1e-6 / took_s)
 
 
-def build(plan: Plan, args: argparse.Namespace) -> Vehicle:
-    """The vehicle that the command line asks for, standing where the plan was drawn. Raises ConfigError."""
+def build(
+    plan: Plan,
+    spec: VehicleSpec,
+    kind: type[AnyVehicle],
+    *,
+    plant: Mapping[str, float] | None = None,
+    believed: Mapping[str, float] | None = None,
+    **options: Any,
+) -> AnyVehicle:
+    """A vehicle that stands where the plan was drawn. plant, believed: airframe numbers changed in what flies, and in
+    what its controller takes it to be. options: Vehicle's. Raises ConfigError.
+    """
     home = DEFAULT_HOME
     if isinstance(plan, Uploaded) and plan.home is not None:
         home = GeoPoint(*plan.home)
-    spec, believed = with_airframe(
-        load_vehicle(args.vehicle),
-        dict(getattr(args, "plant", None) or ()),
-        dict(getattr(args, "believed", None) or ()),
-    )
-    return Vehicle(
-        spec,
-        home=home,
-        seed=args.seed,
-        wind_N=args.wind,
-        gust_m_s=getattr(args, "gust", 0.0),
-        overrides=dict(getattr(args, "set", None) or ()),
-        believed_airframe=believed,
-    )
+    flown, airframe = with_airframe(spec, plant or {}, believed or {})
+    return kind(flown, home=home, believed_airframe=airframe, **options)
 
 
 def main(args: argparse.Namespace) -> int:
@@ -90,7 +92,17 @@ def main(args: argparse.Namespace) -> int:
     """
     try:
         plan = plans.load(args.mission)
-        vehicle = build(plan, args)
+        vehicle = build(
+            plan,
+            load_vehicle(args.vehicle),
+            Vehicle,
+            plant=dict(args.plant),
+            believed=dict(args.believed),
+            seed=args.seed,
+            wind_N=args.wind,
+            gust_m_s=args.gust,
+            overrides=dict(args.set),
+        )
         out = Path(args.out) if args.out else None
         results.prepare(out)
     except ConfigError as error:

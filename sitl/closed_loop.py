@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sitl.control.cascade import Command, Memory, at_rest, cascade, standing_command
+from sitl.control.cascade import Command, Memory, at_rest, cascade, direct_command, standing_command
 from sitl.control.gains import Gains, Settings
 from sitl.control.guidance import Guidance
 from sitl.control.reference import Reference, sample
@@ -40,7 +40,7 @@ from sitl.quaternion import Vec3, rotate_back
 
 Array = NDArray[np.float64]
 NOISE_COLUMNS = 3 + NOISES  # gusts, then sensors
-_OFF, _IDLE = 0, 1  # Effort.OFF, Effort.IDLE as plain numbers
+_OFF, _IDLE, _FLY, _DIRECT = 0, 1, 2, 3  # of Effort, as plain numbers
 _COVARIANCE_HZ = 100.0
 _STILL_RAD_S, _STILL_M_S2 = 0.1, 0.5  # readings of an IMU that stands, at most this far from rest
 
@@ -276,6 +276,9 @@ def run(
         elif guidance.effort == _IDLE:
             command = standing_command(nav, plant.airframe.thrust_min_N)
             reference = sample(guidance.trajectory, t_s)
+        elif guidance.effort == _DIRECT:
+            command = direct_command(plant.airframe, nav, guidance.actuation)
+            reference = sample(guidance.trajectory, t_s)
         else:
             command, memory, reference = cascade(
                 controller.airframe, controller.gains, controller.settings, guidance, memory, nav, t_s, dt_s
@@ -298,7 +301,7 @@ def run(
                 off = guidance.effort == _OFF
                 now_us = start_us + (k + 1) * dt_us
                 estimate = _navigated(estimate, controller.tuning, plant, errors, s, n, off, now_us, dt_us)
-    if guidance.effort <= _IDLE and steps > 0:
+    if guidance.effort != _FLY and steps > 0:
         memory = at_rest(controller.airframe, controller.airframe.thrust_min_N)
     acting, specific_force, linear = _motion(plant, s, wind_N)
     observed = Observed(

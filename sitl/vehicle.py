@@ -5,7 +5,7 @@ give the same bits. Nothing in here reads a clock, a socket or the environment.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from sitl.closed_loop import NOISE_COLUMNS, TRACE_COLUMNS, Controller, LoopState, Plant, knowing, start
 from sitl.control.disturbance import Bandwidth
 from sitl.control.gains import GAIN_NAMES, PerAxis, Settings, from_names
+from sitl.control.guidance import Guidance
 from sitl.estimation.alignment import aligned
 from sitl.estimation.error_state import Tuning
 from sitl.frames import GRAVITY_M_S2, standing
@@ -36,6 +37,7 @@ from sitl.model.failures import SOUND, Failures, heard
 from sitl.model.rigid_body import State
 from sitl.model.sensors import NOISES, PERFECT, TURN_ON, magnetometer, step_sensors, switched_on
 from sitl.model.wind import Wind
+from sitl.navigation import NavState
 from sitl.onboard.commander import Commander
 from sitl.onboard.declarations import declarations
 from sitl.onboard.events import EventLog
@@ -54,6 +56,7 @@ __all__ = ["DEFAULT_HOME", "Load", "Vehicle", "load_vehicle", "vehicle_names", "
 DEFAULT_HOME = GeoPoint(55.6985, 37.3595, 190.0)  # Skolkovo, where the paper's vehicle was built
 TICK_US = 20_000  # of the onboard logic
 _NO_TRACE = np.zeros((0, len(TRACE_COLUMNS)))
+Pilot = Callable[[float, NavState, Guidance], Guidance]
 _NO_NOISE = np.zeros((0, NOISE_COLUMNS))
 
 # a three-cell 2200 mAh pack, linear between full and empty; propulsion as a whole is half efficient
@@ -68,7 +71,12 @@ class Vehicle:
     and plan persist (None: nowhere). overrides: parameter values for this run. believed_airframe: what the
     controller takes the airframe to be (None: what it is). Raises ConfigError for an override that the parameter's
     declaration refuses.
+
+    pilot: asked before every control step, with the simulation time [s], the navigation state and what the onboard
+    logic wants; what it returns is flown instead. Each step is then a crossing into compiled code of its own.
     """
+
+    pilot: Pilot | None = None
 
     def __init__(
         self,
@@ -137,7 +145,7 @@ class Vehicle:
         self._next_tick_us = self.now_us
         self.commander.restart(self.heading_rad)
         self._guidance = self.commander.guidance
-        self._run(0, _NO_TRACE)
+        self._run(0, _NO_TRACE, self._guidance)
 
     @property
     def failures(self) -> Failures:
@@ -235,10 +243,10 @@ class Vehicle:
     def loop(self, loop: LoopState) -> None:
         put_loop(self._loop_array, loop)
 
-    def _run(self, steps: int, trace: np.ndarray[Any, np.dtype[np.float64]]) -> None:
+    def _run(self, steps: int, trace: np.ndarray[Any, np.dtype[np.float64]], guidance: Guidance) -> None:
         noise = self._random.standard_normal((steps, NOISE_COLUMNS)) if self._noisy and steps else _NO_NOISE
         run_in_place(
-            self._plants, self._controllers, self._guidance, self._loop_array, noise, self.now_us, self.step_us, steps,
+            self._plants, self._controllers, guidance, self._loop_array, noise, self.now_us, self.step_us, steps,
             trace, self._observed_array,
         )  # fmt: skip
         self.now_us += steps * self.step_us
@@ -262,7 +270,10 @@ class Vehicle:
             # where the control period does not divide the tick, the tick comes with the first step after it
             to_tick = -(-(self._next_tick_us - self.now_us) // self.step_us)
             steps = max(1, min((until_us - self.now_us) // self.step_us, to_tick))
-            self._run(steps, trace[row : row + steps] if trace is not None else _NO_TRACE)
+            guidance = self._guidance
+            if self.pilot is not None:
+                steps, guidance = 1, self.pilot(self.now_us * 1e-6, nav_of(self._observed_array), guidance)
+            self._run(steps, trace[row : row + steps] if trace is not None else _NO_TRACE, guidance)
             row += steps
         self.commander.observe(self.now_us, nav_of(self._observed_array), int(self._observed_array[-1]))
 

@@ -16,7 +16,7 @@ from sitl.control.disturbance import Disturbance, Flaps, none, observed
 from sitl.control.feedforward import Trim, heading_frame, invert, reference_needs, refined
 from sitl.control.flow import flow_at
 from sitl.control.gains import Gains, Settings
-from sitl.control.guidance import Guidance
+from sitl.control.guidance import Actuation, Guidance
 from sitl.control.pid import integrated, smoothed
 from sitl.control.position import velocity_command
 from sitl.control.rate import moment
@@ -93,6 +93,18 @@ def standing_command(nav: NavState, thrust_each_N: float) -> Command:
     """Motors at a given thrust, flaps centred: the vehicle stands, disarmed or idling."""
     t = thrust_each_N
     return Command(nav.qw, nav.qx, nav.qy, nav.qz, 0.0, 0.0, 0.0, t, t, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@kernel
+def direct_command(a: Airframe, nav: NavState, x: Actuation) -> Command:
+    """What was asked of the actuators, within their limits; there are no inner targets."""
+    left = min(max(x.thrust_left_N, a.thrust_min_N), a.thrust_max_N)
+    right = min(max(x.thrust_right_N, a.thrust_min_N), a.thrust_max_N)
+    flap_left = min(max(x.flap_left_rad, -a.flap_max_rad), a.flap_max_rad)
+    flap_right = min(max(x.flap_right_rad, -a.flap_max_rad), a.flap_max_rad)
+    return Command(
+        nav.qw, nav.qx, nav.qy, nav.qz, 0.0, 0.0, 0.0, left, right, flap_left, flap_right, 0.0, 0.0, 0.0, 0.0
+    )
 
 
 @kernel

@@ -12,6 +12,7 @@ class Effort(IntEnum):
     OFF = 0  # motors stopped, flaps centred (disarmed)
     IDLE = 1  # motors at their least thrust, integrators held at zero (armed, standing)
     FLY = 2  # the whole cascade follows the trajectory
+    DIRECT = 3  # none of it: the actuators get what Guidance.actuation says
 
 
 class Steering(NamedTuple):
@@ -35,6 +36,18 @@ class Steering(NamedTuple):
 STRAIGHT = Steering(0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
+class Actuation(NamedTuple):
+    """What motors and flaps are told: thrust of each motor, deflection of each flap (docs/model.md)."""
+
+    thrust_left_N: float
+    thrust_right_N: float
+    flap_left_rad: float
+    flap_right_rad: float
+
+
+STILL = Actuation(0.0, 0.0, 0.0, 0.0)
+
+
 class Guidance(NamedTuple):
     """Effort, trajectory, which of its derivatives bind on each axis, and what is flown in its place.
 
@@ -53,3 +66,4 @@ class Guidance(NamedTuple):
     follow_velocity_down: float = 1.0
     aloft: float = 1.0
     steering: Steering = STRAIGHT
+    actuation: Actuation = STILL  # for Effort.DIRECT
