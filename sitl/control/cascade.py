@@ -181,12 +181,11 @@ def cascade(
         fp[2] * (ref.down_m - nav.down_m),
     )
     reference_velocity = (ref.v_north_m_s, ref.v_east_m_s, ref.v_down_m_s)
-    # without velocity feed-forward the derivative acts on the measured velocity alone
-    k = s.feedforward_velocity
-    lag = (k * ref.v_north_m_s - velocity[0], k * ref.v_east_m_s - velocity[1], k * ref.v_down_m_s - velocity[2])
+    lag = _difference(reference_velocity, velocity)  # the error's own rate, which the printed derivative acts on
     position_integral = _integrated(
         m.position_integral, position_error, dt_s, _POSITION_INTEGRAL_MAX, (tilt_held, tilt_held, thrust_held)
     )
+    k = s.feedforward_velocity
     v_ff = (
         reference_velocity[0] if fp[0] == 0.0 else k * reference_velocity[0],
         reference_velocity[1] if fp[1] == 0.0 else k * reference_velocity[1],

@@ -9,7 +9,7 @@ from sitl.reproduce.cases import BEYOND
 from sitl.reproduce.drawing import COLOURS, REFERENCE, Plot, legend_above
 from sitl.reproduce.evaluation import Evaluation
 from sitl.reproduce.robustness import ANGLES_DEG, AXES, STEP_LASTS_S
-from sitl.reproduce.tables import Cell, Group, Row, Table
+from sitl.reproduce.tables import Cell, Group, Row, Table, told
 from sitl.reproduce.trials import TRIALS, Measure
 
 _SETTLED, _OVERSHOOT = 0.02, 0.05
@@ -22,7 +22,7 @@ def worst(evaluation: Evaluation, trial: str, setup: str) -> tuple[float, ...]:
 
 def _cell(value: float, measure: Measure) -> Cell:
     if math.isfinite(value):
-        return Cell(f"{value:.3g}", value, value <= measure.limit)
+        return Cell(told(value, 3 if measure.limit < 1.0 else 2), value, value <= measure.limit)
     return Cell(f"not in {STEP_LASTS_S:g} s" if measure.unit == "s" else "lost", None, False)
 
 
@@ -53,10 +53,9 @@ def notes(evaluation: Evaluation) -> list[str]:
         met.append(f"{setup.title} {sum(marks)} of {len(marks)}")
     return [
         f"Met: {'; '.join(met)}. The aims are this project's own; the paper has nothing to compare with.",
-        f"Seeds {', '.join(map(str, evaluation.seeds))} where chance has a part (gusts, noise), one flight where it "
-        "has none. "
-        "Steps are of position targets without velocity or acceleration, so nothing is fed forward; z steps up. "
-        "Recovery starts with motors off, 20 m up, turned about one body axis.",
+        f"Seeds {', '.join(map(str, evaluation.seeds))} where chance has a part (gusts, an erring filter), one flight "
+        "where it has none. Steps are of position targets without velocity or acceleration, so nothing is fed "
+        "forward; z steps up. Recovery starts with motors off, 20 m up.",
     ]
 
 

@@ -113,9 +113,6 @@ ABLATIONS = (
     Ablation(
         "both", "both-absent", "neither has either", plant=_NO_TORQUE + _NO_WAKE_ARM, believed=_NO_TORQUE + _NO_WAKE_ARM
     ),
-    Ablation(
-        "both", "both-absent", "neither has either", plant=_NO_TORQUE + _NO_WAKE_ARM, believed=_NO_TORQUE + _NO_WAKE_ARM
-    ),
     Ablation("disturbance observer", "no-observer", "off", overrides=NO_OBSERVER),
     Ablation("attitude error", "yxz", "Euler YXZ instead of quaternion", overrides=(("SYS_ATT_ERROR", 0.0),)),
     Ablation("feed-forward", "ff-none", "none", overrides=NO_FEEDFORWARD),

@@ -77,8 +77,8 @@ def _position(mission: str, by_setup: dict[str, Flight]) -> Plot:
 
     note = (
         "True positions. Only feedback alone can be told from the reference by eye: it arrives late. On the right the "
-        "same as errors: feed-forward brings them from metres to centimetres and less, and with noise they stay "
-        "within two."
+        "same as errors: feed-forward brings them from decimetres to millimetres, and a filter's own error to a "
+        "centimetre or two."
     )
     return Plot(f"{mission}-position", f"{mission.capitalize()}: positions over time", note, (10.5, 6.0), draw)
 
@@ -98,12 +98,14 @@ def _attitude(mission: str, by_setup: dict[str, Flight]) -> Plot:
         "rectangle": (
             "The paper's YXZ angles. Yaw ψ is the lean that starts and stops each lateral leg, twice as much for the "
             "10 m of the third leg as for the 5 m of the others. Pitch θ carries the 20 m legs: nose down out, nose "
-            "up back, around hover's 99.5°. Roll φ, the heading, stays where it is but for the noise."
+            "up back, around hover's 99.5°. Roll φ is the heading; on a filter's estimate it begins off by the "
+            "magnetometer's error, until the accelerations of the legs tell it better."
         ),
         "circle": (
             "The paper's YXZ angles. Going round at 0.28 m/s takes a pitch that swings by two degrees with the "
             "airspeed along the wing's normal, and a fifth of a degree of lean; the bumps of yaw ψ at 7 s and 52 s "
-            "are the lap's start and end."
+            "are the lap's start and end. Roll φ is the heading; so gentle a flight tells a filter little of it, and "
+            "the magnetometer's error stays."
         ),
     }
     title = f"{mission.capitalize()}: attitude over time"
@@ -127,8 +129,9 @@ def _actuators(mission: str, by_setup: dict[str, Flight]) -> Plot:
         legend_above(figure, panels[0][0])
 
     note = (
-        "What the actuators do, not what they are told. With a known state left and right are one line: lateral legs "
-        "take differences of millinewtons. With noise the flaps work by some degrees all the time."
+        "What the actuators do, not what they are told. Left and right are one line as far as the eye can tell: "
+        "lateral legs take differences of millinewtons. Real sensors keep the flaps moving by half a degree. Spikes "
+        "stand where a reference begins or ends a leg along x, because its jerk jumps there."
     )
     return Plot(f"{mission}-actuators", f"{mission.capitalize()}: actuators over time", note, (10.5, 4.5), draw)
 
@@ -168,12 +171,13 @@ def _path(flights: dict[str, dict[str, Flight]]) -> Plot:
                 axes.plot(*path, color=COLOURS[setup.key], label=setup.title)
             axes.set(xlabel="east [m]", ylabel="north [m]", zlabel="up [m]", title=mission)
             axes.set_box_aspect((1, 1, 0.6))
+            axes.locator_params(nbins=5)
         legend_above(figure, figure.axes[0])
 
     return Plot(
         "paths",
         "Both flights in space",
-        "Seen from the south-east and above; north, east and up to different scales.",
+        "Seen from the south and above; north, east and up to different scales.",
         (10.5, 5.0),
         draw,
     )

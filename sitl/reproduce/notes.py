@@ -35,7 +35,13 @@ _CIRCLE_LEAST_N = 12.526  # printed
 def notes(evaluation: Evaluation) -> Notes:
     ranges = [_yaw(evaluation), _circle_yaw(evaluation), _pitch(evaluation), _thrust(), _shape()]
     return {
-        "overview": [_feedback(), *_overall(evaluation), _yaw(evaluation), _thrust(), _side_force(evaluation)],
+        "overview": [
+            _feedback(evaluation),
+            *_overall(evaluation),
+            _yaw(evaluation),
+            _thrust(),
+            _side_force(evaluation),
+        ],
         **{f"{mission}-true": _tracking(evaluation, mission) for mission in MISSIONS},
         "seeds": [_seeds(evaluation)],
         "ranges": ranges,
@@ -55,18 +61,19 @@ def _airframe() -> Airframe:
     return load_vehicle("yawsitter").airframe.airframe
 
 
-def _feedback() -> str:
+def _feedback(evaluation: Evaluation) -> str:
     """∫e of a loop without velocity feed-forward: v = K_p e + K_d ė, and e is zero at both ends of a leg."""
     gains = load_vehicle("yawsitter").gains
     travel = {"x": 40.0, "y": 20.0, "z": 10.0}
     owed = " / ".join(f"{d / gains[f'POS_{axis.upper()}_P']:.1f}" for axis, d in travel.items())
     printed = " / ".join(f"{v:.2f}" for v in OVERALL["rectangle"]["iae"])
+    flown = " / ".join(f"{v:.1f}" for v in evaluation.flight("feedback", "rectangle").true["iae"])
     return (
         "The printed loops alone can't have flown the printed errors. A position loop V = K_p e + K_d ė trails a "
         "moving reference by about v / K_p, whatever its course in time, so that each way travelled costs way / K_p "
-        f"of ∫|e| dt: {owed} m·s for x / y / z of the rectangle, against a printed {printed} (the small K_i pays back "
-        "a part). A feed-forward must have been at work that the paper doesn't describe, or the error was measured "
-        "otherwise than against the moving reference."
+        f"of ∫|e| dt: {owed} m·s for x / y / z of the rectangle, {flown} when flown, against a printed {printed}. A "
+        "feed-forward must have been at work that the paper doesn't describe, or the error was measured otherwise "
+        "than against the moving reference."
     )
 
 
@@ -201,12 +208,12 @@ def _ablations(evaluation: Evaluation) -> list[str]:
     return [
         "K_f: with this cascade, which moves sideways by leaning, the rectangle's mean y error is "
         f"{1000 * mae('kf-0'):.2f} mm without side force, {1000 * mae('as-is'):.2f} mm with K_f = 0.2 and "
-        f"{1000 * mae('kf-03'):.2f} mm with 0.3: it helps by a tenth of a millimetre and is not what tracks. How the "
+        f"{1000 * mae('kf-03'):.2f} mm with 0.3: it is not what tracks. How the "
         "paper's own allocation, ΔT = M_z / L_y + F_y, would use it can't be flown: as printed it adds newtons to "
         "newton metres per metre.",
         *_coupling(evaluation),
         "Attitude error: at heading zero YXZ angles and quaternion agree to second order; they part at large angles, "
-        "and near ±90° of heading, where the YXZ angles are singular.",
+        "as in the step east, and near ±90° of heading, where the YXZ angles are singular.",
         f"The literal airframe's flaps go from {told(literal[0], 1)}° to {told(literal[1], 1)}° on the rectangle"
         + (", into their stops." if max(map(abs, literal)) > 34.9 else "."),
     ]

@@ -33,6 +33,11 @@ ANGLES_DEG = (30, 60, 90, 120, 150, 170, -30, -60, -90, -120, -150, -170)
 WIND_N, GUST_M_S = (2.0, 0.0, 0.0), 1.0
 STEP_M, STEP_LASTS_S = 3.0, 10.0
 STILL: Vec3 = (0.0, 0.0, 0.0)
+BODY_AXES: tuple[Vec3, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+# between the body axes, and 3° beside the pitch axis: where a turn that starts nearly straight can go astray
+OBLIQUE_AXES: tuple[Vec3, ...] = (
+    (1.0, 1.0, 0.0), (1.0, 0.0, 1.0), (0.0, 1.0, 1.0), (0.0, 1.0, -1.0), (1.0, 1.0, 1.0), (0.0, 1.0, 0.0524),
+)  # fmt: skip
 DRIFTS: tuple[Vec3, ...] = ((5.0, 0.0, 0.0), (-5.0, 0.0, 0.0), (0.0, 5.0, 0.0))
 _HEIGHT_M, _RECOVERY_HEIGHT_M, _RECOVERY_S = 5.0, 20.0, 10.0
 _CLIMB_S, _HOVER_S, _QUARTER_TURN_S = 15.0, 60.0, 6.0
@@ -182,16 +187,15 @@ def _thrown(craft: Craft) -> tuple[VehicleSpec, Plant, Controller]:
     return spec, plant, Vehicle(spec, overrides=dict(craft.overrides)).controller
 
 
-def excursion(craft: Craft, axis: int, degrees: float, velocity: Vec3, seed: int = 1) -> tuple[float, float]:
-    """(greatest, last) distance [m] from the point to be held, over 10 s from a start turned about a body axis.
+def excursion(craft: Craft, axis_B: Vec3, degrees: float, velocity: Vec3, seed: int = 1) -> tuple[float, float]:
+    """(greatest, last) distance [m] from the point to be held, over 10 s from a start turned about an axis in B.
 
     It begins 20 m up, at rest in the air or drifting, motors off; a filter knows the state and its sensors' biases.
     """
     spec, plant, controller = _thrown(craft)
-    half = math.radians(degrees) / 2
-    turn = [0.0, 0.0, 0.0]
-    turn[axis] = math.sin(half)
-    q = multiply(standing(0.0, plant.gear.standing_pitch_rad), (math.cos(half), turn[0], turn[1], turn[2]))
+    half, length = math.radians(degrees) / 2, math.hypot(*axis_B)
+    x, y, z = (math.sin(half) * c / length for c in axis_B)
+    q = multiply(standing(0.0, plant.gear.standing_pitch_rad), (math.cos(half), x, y, z))
     state = State(0.0, 0.0, -_RECOVERY_HEIGHT_M, *velocity, *q, *([0.0] * 7))
     steps = round(_RECOVERY_S * spec.control_rate_hz)
     random = np.random.Generator(np.random.PCG64(seed))
@@ -211,10 +215,10 @@ def excursion(craft: Craft, axis: int, degrees: float, velocity: Vec3, seed: int
 
 
 def excursions(craft: Craft, seed: int = 1) -> Array:
-    """(3, angles) greatest distance [m] from a start at rest, by axis and angle."""
-    return np.array([[excursion(craft, k, d, STILL, seed)[0] for d in ANGLES_DEG] for k in range(3)])
+    """(3, angles) greatest distance [m] from a start at rest, by body axis and angle."""
+    return np.array([[excursion(craft, axis, d, STILL, seed)[0] for d in ANGLES_DEG] for axis in BODY_AXES])
 
 
-def recovery(velocities: tuple[Vec3, ...], craft: Craft, seed: int) -> tuple[float, ...]:
+def recovery(axes: tuple[Vec3, ...], velocities: tuple[Vec3, ...], craft: Craft, seed: int) -> tuple[float, ...]:
     """The greatest excursion [m] over all angles, axes and velocities."""
-    return (max(excursion(craft, k, d, v, seed)[0] for k in range(3) for d in ANGLES_DEG for v in velocities),)
+    return (max(excursion(craft, axis, d, v, seed)[0] for axis in axes for d in ANGLES_DEG for v in velocities),)

@@ -10,8 +10,10 @@ from functools import partial
 from typing import NamedTuple
 
 from sitl.daemon import config
+from sitl.quaternion import Vec3
 from sitl.reproduce import robustness
 from sitl.reproduce.cases import MISSIONS, Craft, Values
+from sitl.reproduce.robustness import AXES, BODY_AXES, DRIFTS, OBLIQUE_AXES, STILL
 from sitl.strict_yaml import ConfigError
 from sitl.vehicle import load_vehicle
 
@@ -49,8 +51,12 @@ def _rms(limit_m: float) -> tuple[Measure]:
     return (Measure("greatest RMS of an axis", "m", limit_m),)
 
 
+def _recovery(key: str, title: str, limit_m: float, axes: tuple[Vec3, ...], velocities: tuple[Vec3, ...]) -> Trial:
+    fly = partial(robustness.recovery, axes, velocities)
+    return Trial(key, "recovery from 30° to 170°", title, _excursion(limit_m), fly)
+
+
 _WIND = "wind of 2 m/s with 1 m/s of gusts"
-_RECOVERY = "recovery from 30° to 170° about any axis"
 _STEPS = "3 m steps of the bare position target"
 _STEP = (Measure("overshoot", "%", 5.0), Measure("within 2 % after", "s", 5.0))
 TRIALS = (
@@ -59,19 +65,11 @@ TRIALS = (
     _model("immersion", "60 % of the wing immersed, not 51 %", (("immersed_fraction", 0.6),)),
     Trial("wind-hover", _WIND, "hover", _rms(0.10), robustness.windy_hover, True),
     Trial("wind-rectangle", _WIND, "rectangle", _rms(0.25), robustness.windy_rectangle, True),
-    Trial("recovery-rest", _RECOVERY, "at rest", _excursion(4.0), partial(robustness.recovery, (robustness.STILL,))),
-    Trial(
-        "recovery-drift",
-        _RECOVERY,
-        "drifting at 5 m/s",
-        _excursion(8.0),
-        partial(robustness.recovery, robustness.DRIFTS),
-    ),
+    _recovery("recovery-rest", "about each body axis, at rest", 4.0, BODY_AXES, (STILL,)),
+    _recovery("recovery-oblique", "about axes between them, at rest", 4.0, OBLIQUE_AXES, (STILL,)),
+    _recovery("recovery-drift", "about each body axis, drifting at 5 m/s", 8.0, BODY_AXES, DRIFTS),
     Trial("turn", "turning", "full turn of the heading in hover", _excursion(0.05), robustness.full_turn),
-    *(
-        Trial(f"step-{name}", _STEPS, name, _STEP, partial(robustness.step, axis))
-        for axis, name in enumerate(robustness.AXES)
-    ),
+    *(Trial(f"step-{name}", _STEPS, name, _STEP, partial(robustness.step, axis)) for axis, name in enumerate(AXES)),
 )
 
 
