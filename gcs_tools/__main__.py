@@ -65,6 +65,18 @@ def _key(text: str) -> bytes:
         raise argparse.ArgumentTypeError(str(error)) from None
 
 
+def _home(text: str) -> Any:
+    from gcs_tools.plan import Home
+
+    try:
+        home = Home(*map(_number, text.split(",")))
+    except (TypeError, argparse.ArgumentTypeError):
+        home = None
+    if home is None or abs(home.lat_deg) > 90.0 or abs(home.lon_deg) > 180.0:
+        raise argparse.ArgumentTypeError(f"'{text}' is not LAT,LON,ALT (degrees, metres above mean sea level)")
+    return home
+
+
 def _number(text: str) -> float:
     import math
 
@@ -133,6 +145,21 @@ def parser() -> argparse.ArgumentParser:
     fly.add_argument("mission", type=Path, metavar="MISSION", help="a mission (.yaml) or QGroundControl plan (.plan)")
     fly.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     fly.add_argument("--out", type=Path, metavar="DIR", help="write result.json and track.csv here")
+
+    plan = commands.add_parser(
+        "plan",
+        help="check a mission, print its timeline, convert it",
+        description="Check a mission and print its timeline; with --to write it in another format. Needs no vehicle.",
+        epilog="examples:\n  gcs plan missions/rectangle-mission.yaml\n  gcs plan field.plan --to field.waypoints\n"
+        "  gcs plan missions/rectangle-mission.yaml --home 55.6985,37.3595,190 --to field.plan",
+        formatter_class=_Raw,
+        allow_abbrev=False,
+    )
+    plan.add_argument("mission", type=Path, metavar="FILE", help=".yaml, .plan (QGroundControl), .waypoints (QGC WPL)")
+    plan.add_argument("--to", type=Path, metavar="FILE", help="write it here, in the format of the ending")
+    plan.add_argument(
+        "--home", type=_home, metavar="LAT,LON,ALT", help="where the vehicle will stand (the file's own): deg, m AMSL"
+    )
 
     param = commands.add_parser("param", help="list, read, write, save and load parameters", formatter_class=_Raw)
     actions = param.add_subparsers(dest="action", required=True, metavar="ACTION", parser_class=_Parser)

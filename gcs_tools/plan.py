@@ -5,8 +5,10 @@ vehicle stores and flies by itself in Mission mode).
 """
 
 import math
+from collections.abc import Callable, Sequence
+from importlib import import_module
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 from gcs_tools.reference import Reference, Vector
 from sitl.strict_yaml import ConfigError
@@ -17,6 +19,7 @@ FRAME_MISSION = 2
 LOCAL_SCALE = 1e4  # x and y of items in local frames travel as integers of 1e-4 m
 GLOBAL_SCALE = 1e7  # degE7
 GLOBAL_FRAMES = {0: 5, 3: 6, 10: 11, 5: 5, 6: 6, 11: 11}  # any global frame → its _INT form on the wire
+_PLAIN = {5: 0, 6: 3, 11: 10}
 LOCAL_FRAMES = (1, 7)
 
 
@@ -39,6 +42,37 @@ class Item(NamedTuple):
         if self.frame != FRAME_LOCAL_NED or self.command == 20 or not math.isfinite(self.z):
             return None
         return self.x / LOCAL_SCALE, self.y / LOCAL_SCALE, self.z
+
+
+Fault = Callable[[str, str], NoReturn]  # field ("frame", "params[4]"), message
+
+
+def item_of(frame: int, command: int, params: Sequence[float | None], autocontinue: bool, fault: Fault) -> Item:
+    """The item that a file writes with seven params, of which 5..7 are a place in the item's own frame."""
+    p1, p2, p3, p4, p5, p6, p7 = (math.nan if p is None else float(p) for p in params)
+    if frame in GLOBAL_FRAMES:
+        sent, scale = GLOBAL_FRAMES[frame], GLOBAL_SCALE
+        for k, (value, limit) in enumerate(((p5, 90.0), (p6, 180.0)), start=4):
+            if not abs(value) <= limit and not math.isnan(value):
+                fault(f"params[{k}]", f"{value:g}° is no place; allowed -{limit:g} to {limit:g}")
+    elif frame in LOCAL_FRAMES:
+        sent, scale = frame, LOCAL_SCALE
+    elif frame == FRAME_MISSION:
+        sent, scale = frame, 1.0
+    else:
+        known = ", ".join(map(str, sorted((*GLOBAL_FRAMES, *LOCAL_FRAMES, FRAME_MISSION))))
+        fault("frame", f"{frame} is not a frame of mission items; allowed: {known}")
+    x, y = (round(p * scale) if math.isfinite(p) else 0 for p in (p5, p6))
+    if not all(-(2**31) <= value < 2**31 for value in (x, y)):
+        fault("params", "a coordinate is too large for the link")
+    return Item(sent, command, p1, p2, p3, p4, x, y, p7, int(autocontinue))
+
+
+def written(item: Item) -> tuple[int, tuple[float, ...]]:
+    """(frame, seven params) as files write an item: the reverse of item_of; global frames without _INT."""
+    frame = _PLAIN.get(item.frame, item.frame)
+    scale = GLOBAL_SCALE if item.frame in GLOBAL_FRAMES else LOCAL_SCALE if item.frame in LOCAL_FRAMES else 1.0
+    return frame, (item.param1, item.param2, item.param3, item.param4, item.x / scale, item.y / scale, item.z)
 
 
 class Home(NamedTuple):
@@ -87,23 +121,33 @@ def read_text(path: str | Path) -> str:
 def _neighbours(path: Path) -> str:
     """What else is there, to put behind a message about a file that isn't."""
     folder = path.parent if path.parent.is_dir() and path.parent != Path(".") else Path("missions")
-    names = sorted(p.name for p in folder.glob("*") if p.suffix in (".yaml", ".plan")) if folder.is_dir() else []
+    names = sorted(p.name for p in folder.glob("*") if p.suffix in READERS) if folder.is_dir() else []
     return f" (in {folder}: {', '.join(names)})" if names else ""
 
 
+# by ending; a .txt is what older ground stations call a .waypoints
+READERS = {
+    ".yaml": "gcs_tools.yaml_plan",
+    ".yml": "gcs_tools.yaml_plan",
+    ".plan": "gcs_tools.qgc_plan",
+    ".waypoints": "gcs_tools.wpl_plan",
+    ".txt": "gcs_tools.wpl_plan",
+}
+
+
+def format_of(path: str | Path) -> Any:
+    """The module that reads and writes such files. Raises ConfigError."""
+    suffix = Path(path).suffix.lower()
+    if suffix not in READERS:
+        raise ConfigError(f"{path}: a mission file ends in .yaml, .plan (QGroundControl) or .waypoints (QGC WPL 110)")
+    return import_module(READERS[suffix])
+
+
 def load(path: str | Path) -> Plan:
-    """The flight in a mission file: YAML as docs/missions.md says, or a QGroundControl .plan.
+    """The flight in a mission file: YAML as docs/missions.md says, a QGroundControl .plan, or QGC WPL 110 text.
 
     Raises ConfigError whose message names the file, the line, the field and what is allowed there.
     """
-    suffix = Path(path).suffix.lower()
-    if suffix == ".plan":
-        from gcs_tools import qgc_plan
-
-        return qgc_plan.loads(read_text(path), str(path))
-    if suffix in (".yaml", ".yml"):
-        from gcs_tools import yaml_plan
-
-        return yaml_plan.loads(read_text(path), str(path))
-    read_text(path)
-    raise ConfigError(f"{path}: a mission file ends in .yaml or .plan (QGroundControl)")
+    text = read_text(path)
+    plan: Plan = format_of(path).loads(text, str(path))
+    return plan

@@ -11,7 +11,7 @@ from typing import Annotated, Any, NoReturn
 
 import msgspec
 
-from gcs_tools.plan import FRAME_MISSION, GLOBAL_FRAMES, GLOBAL_SCALE, LOCAL_FRAMES, LOCAL_SCALE, Home, Item, Uploaded
+from gcs_tools.plan import Home, Item, Uploaded, item_of, written
 from sitl import strict_yaml
 from sitl.strict_yaml import ConfigError
 
@@ -106,23 +106,49 @@ def _item(source: _Source, raw: dict[str, Any], at: str) -> Item:
         pattern = f" ({raw['complexItemType']})" if "complexItemType" in raw else ""
         source.fault(f"{at}.type", f"{raw.get('type')!r}{pattern} can't be flown; allowed: 'SimpleItem'")
     item: _SimpleItem = source.convert(raw, _SimpleItem, at)
-    p1, p2, p3, p4, p5, p6, p7 = (math.nan if p is None else float(p) for p in item.params)
-    if item.frame in GLOBAL_FRAMES:
-        frame, scale = GLOBAL_FRAMES[item.frame], GLOBAL_SCALE
-        for k, (value, limit) in enumerate(((p5, 90.0), (p6, 180.0)), start=4):
-            if not abs(value) <= limit and not math.isnan(value):
-                source.fault(f"{at}.params[{k}]", f"{value:g}° is no place; allowed -{limit:g} to {limit:g}")
-    elif item.frame in LOCAL_FRAMES:
-        frame, scale = item.frame, LOCAL_SCALE
-    elif item.frame == FRAME_MISSION:
-        frame, scale = item.frame, 1.0
-    else:
-        known = ", ".join(map(str, sorted((*GLOBAL_FRAMES, *LOCAL_FRAMES, FRAME_MISSION))))
-        source.fault(f"{at}.frame", f"{item.frame} is not a frame of mission items; allowed: {known}")
-    x, y = (0 if math.isnan(p) else round(p * scale) for p in (p5, p6))
-    if not all(-(2**31) <= value < 2**31 for value in (x, y)):
-        source.fault(f"{at}.params", "a coordinate is too large for the link")
-    return Item(frame, item.command, p1, p2, p3, p4, x, y, p7, int(item.auto_continue))
+    return item_of(
+        item.frame,
+        item.command,
+        item.params,
+        item.auto_continue,
+        lambda field, message: source.fault(f"{at}.{field}", message),
+    )
+
+
+def dumps(plan: Uploaded) -> str:
+    """The text of a .plan file. A parameter that isn't a number is null."""
+    home = plan.home or Home(0.0, 0.0, 0.0)
+    items = []
+    for i, item in enumerate(plan.items):
+        frame, params = written(item)
+        items.append(
+            {
+                "autoContinue": bool(item.autocontinue),
+                "command": item.command,
+                "doJumpId": i + 1,
+                "frame": frame,
+                "params": [p if math.isfinite(p) else None for p in params],
+                "type": "SimpleItem",
+            }
+        )
+    mission = {
+        "cruiseSpeed": 3,
+        "firmwareType": 12,  # MAV_AUTOPILOT_PX4
+        "hoverSpeed": 3,
+        "items": items,
+        "plannedHomePosition": list(home),
+        "vehicleType": 2,  # MAV_TYPE_QUADROTOR
+        "version": MISSION_VERSION,
+    }
+    whole = {
+        "fileType": FILE_TYPE,
+        "geoFence": {"circles": [], "polygons": [], "version": 2},
+        "groundStation": "QGroundControl",
+        "mission": mission,
+        "rallyPoints": {"points": [], "version": 2},
+        "version": FILE_VERSION,
+    }
+    return json.dumps(whole, indent=4) + "\n"
 
 
 def _no_constant(word: str) -> float:

@@ -42,7 +42,7 @@ def show(result: dict[str, Any], paper: str | None, console: Console | None = No
     console = console or Console()
     published = PAPER[paper] if paper else None
     title = f"{result['mission']} · {result['vehicle'] or 'unnamed vehicle'} · {result['duration_s']:g} s"
-    table = _table(f"{title} · paper, flown, ratio" if published else title)
+    table = plain(f"{title} · paper, flown, ratio" if published else title)
     table.add_column("")
     for axis in AXES:
         if published:
@@ -66,12 +66,13 @@ def _beside(flown: float, printed: float) -> list[str]:
     return [f"{printed:.4f}", f"{flown:.4f}", f"[{'green' if ratio <= 1.0 else 'yellow'}]{ratio:.2f}×[/]"]
 
 
-def _table(title: str) -> Table:
+def plain(title: str) -> Table:
+    """A table in the style of all of them."""
     return Table(title=escape(title), title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 0))
 
 
 def _waypoints(waypoints: list[dict[str, Any]]) -> Table:
-    table = _table("error at key times [m], measured − reference")
+    table = plain("error at key times [m], measured − reference")
     for heading in ("t [s]", "target (north, east, down) [m]", *AXES):
         table.add_column(escape(heading), justify="right")
     for w in waypoints:

@@ -57,6 +57,17 @@ def _fly(args: argparse.Namespace) -> None:
     )
 
 
+def _plan(args: argparse.Namespace) -> None:
+    from gcs_tools import convert, plan, timeline
+
+    found = plan.load(args.mission)
+    if args.to is None:
+        timeline.show(found)
+        return
+    written = convert.convert(found, args.to, args.home)
+    print(f"{len(written.items)} items written to {args.to}")
+
+
 def _param(args: argparse.Namespace) -> None:
     _PARAM_TASKS[args.action](args)
 
@@ -163,6 +174,7 @@ _PARAM_TASKS = {
 _LOG_TASKS = {"list": _log_list, "get": _log_get, "erase": _log_erase}
 _TASKS: dict[str, Callable[[argparse.Namespace], None]] = {
     "fly": _fly,
+    "plan": _plan,
     "param": _param,
     "log": _log,
     "watch": _watch,

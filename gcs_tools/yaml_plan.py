@@ -1,5 +1,6 @@
 """The project's own mission files (docs/missions.md): YAML → a Plan; mistakes are named by file, line and field."""
 
+import json
 import math
 from collections.abc import Callable, Mapping
 from itertools import pairwise
@@ -243,3 +244,45 @@ KINDS: dict[str, tuple[Any, Any]] = {
     "circle": (_circle, _Circle),
     "mission": (_mission, _Mission),
 }
+
+
+# How each item is written again: command → (do, its fields from the wire's).
+def _at(item: Item) -> list[float]:
+    return [item.x / LOCAL_SCALE, item.y / LOCAL_SCALE, item.z]
+
+
+_WRITTEN: dict[int, tuple[str, Callable[[Item], dict[str, Any]]]] = {
+    22: ("takeoff", lambda i: {"at_m": _at(i), "heading_deg": i.param4}),
+    16: (
+        "waypoint",
+        lambda i: {"at_m": _at(i), "hold_s": i.param1, "acceptance_m": i.param2, "heading_deg": i.param4},
+    ),
+    21: ("land", lambda i: {"at_m": _at(i)[:2], "heading_deg": i.param4}),
+    20: ("return", lambda i: {}),
+    178: ("speed", lambda i: {"speed_m_s": i.param2}),
+    93: ("delay", lambda i: {"seconds_s": i.param1}),
+}
+
+
+def dumps(plan: Uploaded) -> str:
+    """The text of a YAML mission. Raises ConfigError, naming item and field, for what these files can't say."""
+    lines = [f"name: {json.dumps(plan.name[:80])}", "kind: mission", f"limit_s: {plan.limit_s:g}", "items:"]
+    for n, item in enumerate(plan.items):
+        where = f"{plan.source}: item {n}"
+        if item.command not in _WRITTEN:
+            known = ", ".join(f"{command} ({do})" for command, (do, _) in _WRITTEN.items())
+            raise ConfigError(f"{where}: command: {item.command} can't be written as YAML; allowed: {known}")
+        do, fields = _WRITTEN[item.command]
+        said = {"do": do} | {k: v for k, v in fields(item).items() if v != 0.0 and v == v}
+        struct, write = ITEMS[do]
+        try:
+            again = write(msgspec.convert(said, struct))
+        except msgspec.ValidationError as error:
+            raise ConfigError(f"{where}: {error}") from None
+        for field, old, new in zip(Item._fields, item, again, strict=True):
+            unset = field.startswith("param") and {str(old), str(new)} <= {"0.0", "nan", "0"}
+            if not unset and old != new and not (do == "return" and field in ("frame", "x", "y", "z")):
+                raise ConfigError(f"{where}: {field}: {old:g} can't be written as YAML; it would become {new:g}")
+        pairs = ", ".join(f"{k}: {v if isinstance(v, str) else json.dumps(v)}" for k, v in said.items())
+        lines.append(f"  - {{{pairs}}}")
+    return "\n".join(lines) + "\n"

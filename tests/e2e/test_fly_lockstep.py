@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from gcs_tools import plan as plans
+from gcs_tools import timeline
 from gcs_tools.lockstep import Flown, fly
 from gcs_tools.plan import Home, Streamed, Uploaded
 from gcs_tools.table import PAPER
@@ -191,3 +192,11 @@ def test_a_plan_is_flown_where_it_was_drawn(tmp_path: Path) -> None:
     done = command_line(str(path), "--json")
     assert done.returncode == 0, done.stderr
     assert len(json.loads(done.stdout)["waypoints"]) == 7
+
+
+def test_the_timeline_of_a_mission_expects_about_the_time_that_it_takes() -> None:
+    flight = flown("rectangle-mission.yaml").flight
+    expected = timeline.rows(flight.plan)
+    for row, (reached_s, _) in zip(expected[:-1], flight.reached[:-1], strict=True):
+        assert row.end_s == pytest.approx(reached_s, rel=0.2, abs=1.0)
+    assert flight.measured_s == pytest.approx(expected[-1].end_s, rel=0.15)

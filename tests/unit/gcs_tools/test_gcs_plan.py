@@ -150,9 +150,9 @@ def test_a_missing_file_lists_what_is_there(tmp_path: Path) -> None:
 
 
 def test_a_folder_and_a_foreign_ending_are_refused_by_name(tmp_path: Path) -> None:
-    (tmp_path / "flight.txt").write_text("x")
-    with pytest.raises(ConfigError, match=r"flight\.txt: a mission file ends in \.yaml or \.plan"):
-        plan.load(tmp_path / "flight.txt")
+    (tmp_path / "flight.kml").write_text("x")
+    with pytest.raises(ConfigError, match=r"flight\.kml: a mission file ends in \.yaml, \.plan"):
+        plan.load(tmp_path / "flight.kml")
     (tmp_path / "folder.yaml").mkdir()
     with pytest.raises(ConfigError, match="is a folder"):
         plan.load(tmp_path / "folder.yaml")
