@@ -116,8 +116,9 @@ def _item(source: _Source, raw: dict[str, Any], at: str) -> Item:
 
 
 def dumps(plan: Uploaded) -> str:
-    """The text of a .plan file. A parameter that isn't a number is null."""
-    home = plan.home or Home(0.0, 0.0, 0.0)
+    """The text of a .plan file. A parameter that isn't a number is null. Raises ConfigError for a plan without home."""
+    if plan.home is None:
+        raise ConfigError(f"{plan.source}: home: is missing, a .plan must have one; give it with --home LAT,LON,ALT")
     items = []
     for i, item in enumerate(plan.items):
         frame, params = written(item)
@@ -136,7 +137,7 @@ def dumps(plan: Uploaded) -> str:
         "firmwareType": 12,  # MAV_AUTOPILOT_PX4
         "hoverSpeed": 3,
         "items": items,
-        "plannedHomePosition": list(home),
+        "plannedHomePosition": list(plan.home),
         "vehicleType": 2,  # MAV_TYPE_QUADROTOR
         "version": MISSION_VERSION,
     }

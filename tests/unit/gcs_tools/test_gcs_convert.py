@@ -104,6 +104,7 @@ def test_a_file_without_heading_or_items_is_refused(text: str) -> None:
         (str(MISSIONS / "circle.yaml"), "a.plan", "kind: its targets are streamed by the client"),
         (str(MISSIONS / "rectangle-mission.yaml"), "a.plan", "item 0: frame: 1 has no latitude and longitude"),
         (str(MISSIONS / "rectangle-mission.yaml"), "a.kml", "a mission file ends in .yaml, .plan"),
+        ("homeless.waypoints", "a.plan", "homeless.waypoints: home: is missing, a .plan must have one"),
         ("loiter.waypoints", "a.yaml", "item 0: command: 19 can't be written as YAML"),
         ("passing.waypoints", "a.yaml", "item 0: param3: 5 can't be written as YAML; it would become 0"),
     ],
@@ -119,6 +120,7 @@ def test_what_a_format_cannot_say_is_refused_by_item_and_field(
     monkeypatch.chdir(tmp_path)
     line = "1\t0\t3\t{}\t0\t0\t{}\tnan\t47\t8\t5\t1\n"
     head = "QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t47\t8\t100\t1\n"
+    Path("homeless.waypoints").write_text("QGC WPL 110\n0" + line.format(16, 0)[1:])
     Path("loiter.waypoints").write_text(head + line.format(19, 0))
     Path("passing.waypoints").write_text(head + line.format(16, 5))
     assert main(["plan", source, "--to", to]) == 2
