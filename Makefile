@@ -16,7 +16,7 @@ test: $(READY)
 	@$(BIN)/mypy sitl
 	@$(BIN)/lint-imports
 	@$(BIN)/python -m pytest
-	@NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -m "not e2e and not compiled" tests/unit/model tests/unit/control tests/validation
+	@NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -m "not e2e and not compiled" tests/unit/model tests/unit/control tests/unit/estimation tests/validation
 
 bench: $(READY)
 	@$(BIN)/python -m benchmarks
