@@ -148,3 +148,13 @@ def test_the_timeline_has_places_distances_and_times_that_add_up(capsys: pytest.
     circle = timeline.rows(plan.load(MISSIONS / "circle.yaml"))
     assert sum(row.way_m or 0.0 for row in circle) == pytest.approx(1.0 + 2.0 * math.pi * 2.0, rel=1e-3)
     assert circle[-1].end_s == 55.0
+
+
+def test_an_altitude_above_sea_level_becomes_a_height_above_home(tmp_path: Path) -> None:
+    source = tmp_path / "sea.waypoints"
+    home, item = "0\t1\t0\t16\t0\t0\t0\t0\t47\t8\t488\t1", "1\t0\t0\t16\t0\t0\t0\tnan\t47\t8.001\t494\t1"
+    source.write_text(f"QGC WPL 110\n{home}\n{item}\n")
+    [item_written] = items(convert(source, tmp_path / "sea.yaml"))
+    assert item_written.z == -6.0
+    [row] = timeline.rows(plan.load(source))
+    assert row.place_m == pytest.approx((0.0, 75.8, -6.0), abs=0.1)
