@@ -27,6 +27,7 @@ log = logging.getLogger(__name__)
 
 TURN_BUDGET_S = 0.02  # simulation that takes longer goes on in the next turn, after the sockets were looked at
 QUIET_S = 1.0  # between two reports of faults
+RECEIVE_BUDGET_S = 0.001  # datagrams that take longer to answer wait, so that the next turn is not late
 WAKES_MAX = 32  # for datagrams, between two turns: what a flood brings beyond that waits for the turn
 FACTOR_WINDOW_S = 1.0  # over which the achieved speed is averaged
 
@@ -192,12 +193,15 @@ class Loop:
             self._publisher.turn(wall_s)
 
     def _receive(self, wall_s: float) -> None:
-        for port, address, data in self._sockets.receive():
+        until_s = self._clock() + RECEIVE_BUDGET_S
+        for number, (port, address, data) in enumerate(self._sockets.receive(), 1):
             try:
                 if not self._endpoint.receive(data, address, _KINDS[port], wall_s):
                     self._sockets.refused(port, address, wall_s)
             except Exception:
                 self._complain(f"a datagram of {len(data)} bytes from {address[0]}:{address[1]}", wall_s)
+            if number % 8 == 0 and self._clock() > until_s:
+                break
 
     def _send(self, wall_s: float) -> None:
         try:

@@ -41,17 +41,22 @@ class Sockets:
         time.sleep(max(0.0, seconds))
 
     def receive(self) -> Iterator[tuple[Port, Address, bytes]]:
-        """What has come in, without waiting."""
-        for port, sock in self._sockets.items():
-            for _ in range(DATAGRAMS_AT_ONCE):
+        """What has come in, without waiting, from each socket in turn: the caller may stop before all is read."""
+        waiting = list(self._sockets.items())
+        for _ in range(DATAGRAMS_AT_ONCE):
+            for entry in tuple(waiting):
+                port, sock = entry
                 try:
                     data, address = sock.recvfrom(_DATAGRAM_BYTES)
                 except BlockingIOError:
-                    break
+                    waiting.remove(entry)
+                    continue
                 except OSError:
                     continue  # Windows reports a peer's closed port here; nothing was received
                 self.received += 1
                 yield port, address, data
+            if not waiting:
+                return
 
     @property
     def shunned(self) -> int:

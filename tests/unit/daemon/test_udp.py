@@ -53,6 +53,14 @@ def test_a_flood_is_taken_in_portions(sockets, client) -> None:
     assert sockets.received == DATAGRAMS_AT_ONCE + 5
 
 
+def test_a_flood_at_one_port_does_not_come_before_the_other_port(sockets, client) -> None:
+    for _ in range(100):
+        client.sendto(b"flood", sockets.ports[Port.GCS])
+    client.sendto(b"request", sockets.ports[Port.ONBOARD])
+    first = [data for (_, _, data), _ in zip(sockets.receive(), range(3), strict=False)]
+    assert b"request" in first
+
+
 def test_a_reply_leaves_from_the_port_that_was_written_to(sockets, client) -> None:
     sockets.send(Port.GCS, client.getsockname(), b"reply")
     assert client.recvfrom(100) == (b"reply", sockets.ports[Port.GCS])
