@@ -92,6 +92,8 @@ class Loop:
     def run(self, stopping: Callable[[], bool]) -> Ending:
         """Turn until `stopping()` or until the link asks for an end."""
         wake_s = self._clock()
+        self.pacing = Pacing(self._vehicle.step_us, self._vehicle.now_us, wake_s)  # what came before is not caught up
+        self._generation = -1
         while not stopping():
             wall_s = self._clock()
             if self.pacing.has_deadlines:

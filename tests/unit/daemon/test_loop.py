@@ -147,6 +147,13 @@ def test_real_time_is_kept(bench) -> None:
     assert bench.loop.lateness.overruns == 0
 
 
+def test_the_time_that_building_took_is_not_caught_up(bench) -> None:
+    bench.clock.now_s += 0.2
+    bench.run(TURN_S)
+    assert bench.craft.now_us <= 2 * TURN_S * 1e6
+    assert bench.loop.pacing.slipped_s == 0.0
+
+
 def test_at_ten_times_real_time_the_link_is_served_at_least_each_slice(bench) -> None:
     bench.craft.parameters.set("SIM_SPEED", 10.0)
     bench.run(1.0)
