@@ -83,8 +83,8 @@ examples:
 
 REPRODUCE = """\
 Fly the paper's evaluation in lockstep and write a report: its two error tables and its ranges beside the measured ones,
-figures, ablations, and the loops' poles and margins in hover. Takes a minute on two cores; needs matplotlib, which the
-extra [report] installs.
+figures, ablations, the loops' poles and margins in hover, and flights beyond the paper: model errors, wind, recovery,
+steps. Takes less than two minutes on two cores; needs matplotlib, which the extra [report] installs.
 """
 
 REPRODUCE_EXAMPLES = """\

@@ -25,13 +25,15 @@ class _Bar:
     def __init__(self) -> None:
         from rich import progress
         from rich.console import Console
+        from rich.table import Column
 
         self._console = Console(stderr=True)
         self._progress = progress.Progress(
-            progress.TextColumn("{task.description:<34}"),
-            progress.BarColumn(),
+            progress.BarColumn(30),
             progress.MofNCompleteColumn(),
             progress.TimeElapsedColumn(),
+            progress.TextColumn("{task.description}", table_column=Column(no_wrap=True, overflow="ellipsis", ratio=1)),
+            expand=True,
             console=self._console,
             transient=True,
             disable=not self._console.is_terminal,
