@@ -52,7 +52,8 @@ def notes(evaluation: Evaluation) -> list[str]:
         ]
         met.append(f"{setup.title} {sum(marks)} of {len(marks)}")
     return [
-        f"Met: {'; '.join(met)}. The aims are this project's own; the paper has nothing to compare with.",
+        f"Beyond the paper, aims met: {'; '.join(met)}. The aims are this project's own; the paper has nothing to "
+        "compare with.",
         f"Seeds {', '.join(map(str, evaluation.seeds))} where chance has a part (gusts, an erring filter), one flight "
         "where it has none. Steps are of position targets without velocity or acceleration, so nothing is fed "
         "forward; z steps up. Recovery starts with motors off, 20 m up.",

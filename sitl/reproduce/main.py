@@ -67,8 +67,8 @@ def summary(evaluation: Evaluation) -> list[str]:
     return [
         "The evaluation of “YawSitter: Modeling and Controlling a Tail-Sitter UAV with Enhanced Yaw Control” (Habel, "
         "Mehboob, Sam, Fortin, Tsetserukou) again. Every number was flown or computed by this simulator, in "
-        "lockstep, through its MAVLink link; columns headed “paper” are print. ✓ marks a cell at or below print, ✗ "
-        "one above it.",
+        "lockstep, the missions through its MAVLink link; columns headed “paper” are print. ✓ marks a cell at or "
+        "below print, ✗ one above it.",
         "x, y, z are north, east, down. Errors are measured minus reference. “True” is the plant's own position; “as "
         "it reports it” is the filter's estimate of it, which comes over the link.",
         f"{'Quick: seed' if evaluation.quick else 'Seeds'} {', '.join(map(str, evaluation.seeds))}; {versions}.",

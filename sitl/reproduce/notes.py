@@ -33,6 +33,7 @@ _CIRCLE_LEAST_N = 12.526  # printed
 
 
 def notes(evaluation: Evaluation) -> Notes:
+    beyond_paper = beyond.notes(evaluation)
     ranges = [_yaw(evaluation), _circle_yaw(evaluation), _pitch(evaluation), _thrust(), _shape()]
     return {
         "overview": [
@@ -41,6 +42,7 @@ def notes(evaluation: Evaluation) -> Notes:
             _yaw(evaluation),
             _thrust(),
             _side_force(evaluation),
+            beyond_paper[0],
         ],
         **{f"{mission}-true": _tracking(evaluation, mission) for mission in MISSIONS},
         "seeds": [_seeds(evaluation)],
@@ -53,7 +55,7 @@ def notes(evaluation: Evaluation) -> Notes:
         "readings": _readings(evaluation),
         "limits": [_LIMITS],
         "margins-paper-ideal": [_MARGINS],
-        "trials": beyond.notes(evaluation),
+        "trials": beyond_paper,
     }
 
 

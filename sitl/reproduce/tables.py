@@ -131,7 +131,7 @@ def seeds(evaluation: Evaluation) -> Table:
             cells = [*spread, *(Cell(f"{s:.2f}", s, s <= 1.0) for s in shares)]
             rows.append(Row(label.replace("[m", "[mm"), cells, mission if k == 0 else ""))
     groups = [Group("least … greatest over the seeds", AXES), Group("greatest / print", AXES)]
-    return Table("seeds", "Tuned gains, real actuators and noise: true position over the seeds", groups, rows)
+    return Table("seeds", "Tuned gains, real actuators, sensors and filter: true position over the seeds", groups, rows)
 
 
 _SHAPES = (
