@@ -4,8 +4,9 @@ from typing import Any
 
 import numpy as np
 
+from sitl.drawing import REFERENCE, Plot, legend_above
 from sitl.reproduce.cases import MISSIONS, SETUPS
-from sitl.reproduce.drawing import COLOURS, REFERENCE, Plot, legend_above
+from sitl.reproduce.colours import COLOURS
 from sitl.reproduce.evaluation import Evaluation
 from sitl.reproduce.fly import CAUSES, Flight
 from sitl.reproduce.printed import AXES, OVERALL, ROWS

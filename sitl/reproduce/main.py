@@ -9,8 +9,8 @@ from types import TracebackType
 from typing import Any
 
 from gcs_tools import results
+from sitl.drawing import Drawn, Plot, drawn
 from sitl.reproduce import beyond, flight_figures, model_figures, output
-from sitl.reproduce.drawing import Drawn, Plot, drawn
 from sitl.reproduce.evaluation import Evaluation, evaluate
 from sitl.reproduce.fly import FlightError
 from sitl.reproduce.notes import notes

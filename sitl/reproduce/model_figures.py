@@ -5,9 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from sitl.drawing import REFERENCE, Plot, legend_above
 from sitl.model.aerodynamics import coefficients
 from sitl.model.airframe import Airframe
-from sitl.reproduce.drawing import EXACT, FEEDBACK, FEEDFORWARD, REFERENCE, TUNED, Plot, legend_above
+from sitl.reproduce.colours import EXACT, FEEDBACK, FEEDFORWARD, TUNED
 from sitl.reproduce.linear import READINGS
 from sitl.reproduce.tables import told
 from sitl.vehicle_spec import load_vehicle

@@ -10,8 +10,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from sitl.drawing import Drawn
 from sitl.reproduce.cases import BEYOND, SETUPS
-from sitl.reproduce.drawing import Drawn
 from sitl.reproduce.evaluation import Evaluation
 from sitl.reproduce.fly import COLUMNS, HERE
 from sitl.reproduce.notes import Notes

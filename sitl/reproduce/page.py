@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
+from sitl.drawing import Drawn
 from sitl.reproduce import register
-from sitl.reproduce.drawing import Drawn
 from sitl.reproduce.notes import Notes
 from sitl.reproduce.tables import Cell, Row, Table
 

@@ -4,8 +4,9 @@ import io
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-FEEDBACK, FEEDFORWARD, EXACT, TUNED, REFERENCE = "#d55e00", "#0072b2", "#cc79a7", "#009e73", "#333333"
-COLOURS = {"feedback": FEEDBACK, "feedforward": FEEDFORWARD, "printed": FEEDFORWARD, "exact": EXACT, "tuned": TUNED}
+# Colours that the colour-blind tell apart (Okabe and Ito), and what everything is measured against in dark grey.
+VERMILION, BLUE, PURPLE, GREEN, ORANGE, SKY = "#d55e00", "#0072b2", "#cc79a7", "#009e73", "#e69f00", "#56b4e9"
+REFERENCE = "#333333"
 _STYLE: dict[Any, Any] = {
     "font.size": 9.0,
     "axes.titlesize": 10.0,
