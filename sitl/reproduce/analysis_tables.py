@@ -6,12 +6,13 @@ from typing import Any
 import numpy as np
 
 from gcs_tools.metrics import AIRBORNE_M
+from sitl.page import Cell, Group, Row, Table, told
 from sitl.reproduce.cases import ABLATIONS, MISSIONS
 from sitl.reproduce.evaluation import Evaluation
 from sitl.reproduce.linear import READINGS
 from sitl.reproduce.loops import HOMES
 from sitl.reproduce.printed import AXES
-from sitl.reproduce.tables import Cell, Group, Row, Table, millimetres, number, told
+from sitl.reproduce.tables import millimetres, number
 
 _COLUMNS = (*AXES, "max |φ| [°]")
 _KICK = "max |φ| in a 3 m step east [°]"

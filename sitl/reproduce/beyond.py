@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 
 from sitl.drawing import REFERENCE, Plot, legend_above
+from sitl.page import Cell, Group, Row, Table, told
 from sitl.reproduce.cases import BEYOND
 from sitl.reproduce.colours import COLOURS
 from sitl.reproduce.evaluation import Evaluation
 from sitl.reproduce.robustness import ANGLES_DEG, AXES, STEP_LASTS_S
-from sitl.reproduce.tables import Cell, Group, Row, Table, told
 from sitl.reproduce.trials import TRIALS, Measure
 
 _SETTLED, _OVERSHOOT = 0.02, 0.05

@@ -10,12 +10,13 @@ from typing import Any
 
 from gcs_tools import results
 from sitl.drawing import Drawn, Plot, drawn
+from sitl.page import Table
 from sitl.reproduce import beyond, flight_figures, model_figures, output
 from sitl.reproduce.evaluation import Evaluation, evaluate
 from sitl.reproduce.fly import FlightError
 from sitl.reproduce.notes import notes
 from sitl.reproduce.page import page
-from sitl.reproduce.tables import Table, all_tables
+from sitl.reproduce.tables import all_tables
 from sitl.strict_yaml import ConfigError
 
 

@@ -8,9 +8,9 @@ import numpy as np
 from sitl.drawing import REFERENCE, Plot, legend_above
 from sitl.model.aerodynamics import coefficients
 from sitl.model.airframe import Airframe
+from sitl.page import told
 from sitl.reproduce.colours import EXACT, FEEDBACK, FEEDFORWARD, TUNED
 from sitl.reproduce.linear import READINGS
-from sitl.reproduce.tables import told
 from sitl.vehicle_spec import load_vehicle
 
 _RANGE_DEG = 40.0

@@ -8,12 +8,13 @@ from sitl.frames import GRAVITY_M_S2
 from sitl.model.airframe import Airframe
 from sitl.model.propulsion import wake_speed
 from sitl.model.trim import solve
+from sitl.page import told
 from sitl.reproduce import beyond
 from sitl.reproduce.cases import ABLATIONS, MISSIONS, VIEWS
 from sitl.reproduce.evaluation import Evaluation
 from sitl.reproduce.fly import Flight
 from sitl.reproduce.printed import AXES, OVERALL, ROWS
-from sitl.reproduce.tables import ROUNDING, figures, score, told, tracking
+from sitl.reproduce.tables import ROUNDING, figures, score, tracking
 from sitl.vehicle_spec import load_vehicle
 
 Notes = dict[str, list[str]]  # by Table.key

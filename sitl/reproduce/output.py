@@ -11,12 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from sitl.drawing import Drawn
+from sitl.page import Table
 from sitl.reproduce.cases import BEYOND, SETUPS
 from sitl.reproduce.evaluation import Evaluation
 from sitl.reproduce.fly import COLUMNS, HERE
 from sitl.reproduce.notes import Notes
 from sitl.reproduce.printed import KEY_ERRORS, OVERALL
-from sitl.reproduce.tables import Table, as_rows, score
+from sitl.reproduce.tables import as_rows, score
 from sitl.reproduce.trials import TRIALS, command
 
 _PACKAGES = ("yawsitter-sitl", "numpy", "numba")

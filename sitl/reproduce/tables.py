@@ -1,8 +1,9 @@
 """The report's tables as plain structures, from which the page, the CSV and the tests read alike."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
+from sitl.page import Cell, Group, Row, Table, told
 from sitl.reproduce.cases import MISSIONS, SETUPS, VIEWS, View
 from sitl.reproduce.evaluation import Evaluation
 from sitl.reproduce.printed import AXES, KEY_ERRORS, OVERALL, RANGES, ROWS
@@ -12,43 +13,6 @@ SOURCES = {
     "true": "errors of the true position at key times and overall",
     "reported": "the same of the position that the vehicle reports",
 }
-
-
-class Cell(NamedTuple):
-    text: str
-    value: float | None = None
-    better: bool | None = None  # at or below print, or as it should be; None: not compared
-    span: int = 1  # columns that it fills
-
-
-class Row(NamedTuple):
-    """heading: starts a part of the table."""
-
-    label: str
-    cells: list[Cell]
-    heading: str = ""
-
-
-class Group(NamedTuple):
-    """Columns under one heading."""
-
-    title: str
-    columns: tuple[str, ...]
-
-
-class Table(NamedTuple):
-    key: str
-    title: str
-    groups: list[Group]
-    rows: list[Row]
-
-
-def told(value: float, digits: int, signed: bool = False) -> str:
-    """A number as text, with a true minus sign and without a sign where nothing but zeros is left."""
-    text = f"{value:+.{digits}f}" if signed else f"{value:.{digits}f}"
-    if not text.strip("+-0."):
-        text = text.lstrip("+-")
-    return text.replace("-", "−")
 
 
 def number(value: float, digits: int = 4, printed: float | None = None, signed: bool = False) -> Cell:

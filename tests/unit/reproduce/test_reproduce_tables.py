@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from sitl.page import Cell, Group, Row, Table
 from sitl.reproduce import main, notes, output, page, tables
 from sitl.reproduce.cases import ABLATIONS, MISSIONS, SETUPS, Case, evaluation
 from sitl.reproduce.printed import KEY_ERRORS, OVERALL
-from sitl.reproduce.tables import Cell, Group, Row, Table
 
 
 def test_a_cell_is_compared_by_size_and_equal_within_the_prints_rounding_counts_as_met() -> None:
