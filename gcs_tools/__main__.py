@@ -171,8 +171,11 @@ def parser() -> argparse.ArgumentParser:
     put = add(actions, "set", "write one parameter", "  gcs param set RATE_Y_P 0.4\n  gcs param set SIM_SPEED 5")
     put.add_argument("name", metavar="NAME")
     put.add_argument("value", type=_number, metavar="VALUE")
-    for name, short in (("save", "write all parameters to a YAML file"), ("load", "write a file's values that differ")):
-        add(actions, name, short, f"  gcs param {name} tuned.yaml").add_argument("file", type=Path, metavar="FILE")
+    for name, short, examples in (
+        ("save", "write all parameters to a YAML file", "  gcs param save mine.yaml"),
+        ("load", "write a file's values that differ: YAML, gains file, .param", _LOADS),
+    ):
+        add(actions, name, short, examples).add_argument("file", type=Path, metavar="FILE")
 
     log = commands.add_parser("log", help="list, fetch and erase recorded flights", formatter_class=_Raw)
     actions = log.add_subparsers(dest="action", required=True, metavar="ACTION", parser_class=_Parser)
@@ -208,6 +211,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 _WAIT_DOWN = "until it stands disarmed"
+_LOADS = "  gcs param load mine.yaml\n  gcs param load sitl/gains/tuned.yaml\n  gcs param load qgroundcontrol.params"
 _Raw = argparse.RawDescriptionHelpFormatter
 
 

@@ -22,7 +22,7 @@ from sitl.geodesy import GeoPoint
 from sitl.mavlink.endpoint import Endpoint, PortKind
 from sitl.strict_yaml import ConfigError
 from sitl.vehicle import DEFAULT_HOME, Vehicle, load_vehicle, with_airframe
-from sitl.vehicle_spec import VehicleSpec
+from sitl.vehicle_spec import VehicleSpec, gains_named
 
 TURN_US = 20_000
 ADDRESS = ("127.0.0.1", 14540)
@@ -101,7 +101,7 @@ def main(args: argparse.Namespace) -> int:
             seed=args.seed,
             wind_N=args.wind,
             gust_m_s=args.gust,
-            overrides=dict(args.set),
+            overrides={**(gains_named(args.gains) if args.gains else {}), **dict(args.set)},
         )
         out = Path(args.out) if args.out else None
         results.prepare(out)

@@ -1,18 +1,15 @@
-"""The vehicle's parameters over the link: list, read, write, and keep in a YAML file.
+"""The vehicle's parameters over the link: list, read, write.
 
 Integers travel as their bytes in the message's float (MAVLink's bytewise encoding, PX4's).
 """
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from gcs_tools.client import RETRY_S, TRIES, Client, LinkError, Script
-from sitl import strict_yaml
 from sitl.mavlink import codec
 from sitl.mavlink.codec import mav
 from sitl.mavlink.wire import float32, float_of_int, int_of_float
-from sitl.strict_yaml import ConfigError
 
 _REAL32 = mav.MAV_PARAM_TYPE_REAL32
 _BY_NAME = -1  # param_index of a request by name
@@ -168,37 +165,17 @@ def _check_name(name: str) -> None:
         raise LinkError(f"'{name}' can't be a parameter: names have 1 to 16 letters, digits and underscores")
 
 
-def write_file(path: Path, parameters: Mapping[str, Parameter], vehicle: str | None) -> None:
-    """All parameters as NAME: VALUE. Raises OSError."""
-    lines = [f"# Parameters of {vehicle or 'a vehicle'}; load with: gcs param load {path.name}"]
-    lines += [f"{name}: {p.text}" for name, p in sorted(parameters.items())]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-def read_file(path: Path) -> dict[str, float]:
-    """NAME: VALUE pairs. Raises ConfigError."""
-    return strict_yaml.load(path, dict[str, int | float])
-
-
-def apply_file(client: Client, path: Path, wanted: Mapping[str, float]) -> Script[list[tuple[Parameter, Parameter]]]:
+def apply(client: Client, wanted: Mapping[str, float]) -> Script[list[tuple[Parameter, Parameter]]]:
     """Write what differs; (old, new) of each. Names and kinds are checked before anything is written."""
     present = yield from fetch_all(client)
-    text = path.read_text(encoding="utf-8")
     for name, value in wanted.items():
-        line = strict_yaml.line_of(text, name)
         if name not in present:
-            raise LinkError(f"{path}:{line}: {name}: the vehicle has no such parameter")
+            raise LinkError(f"{name}: the vehicle has no such parameter")
         if present[name].is_int and value != int(value):
-            raise LinkError(f"{path}:{line}: {name}: {value:g} refused: it takes whole numbers")
+            raise LinkError(f"{name}: {value:g} refused: it takes whole numbers")
     changed = []
     for name, value in wanted.items():
         old = present[name]
         if old.value != (int(value) if old.is_int else float32(value)):
-            try:
-                changed.append((old, (yield from _write(client, old, value))))
-            except LinkError as fault:
-                raise LinkError(f"{path}:{strict_yaml.line_of(text, name)}: {fault}") from None
+            changed.append((old, (yield from _write(client, old, value))))
     return changed
-
-
-__all__ = ["ConfigError", "Parameter", "apply_file", "fetch", "fetch_all", "read_file", "store", "write_file"]

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from gcs_tools import commands, logs, params
+from gcs_tools import commands, logs, parameter_files, params
 from gcs_tools.client import Client, LinkError, Script
 from gcs_tools.link import UdpLink, signer
 from sitl.mavlink.signing import Signer
@@ -105,13 +105,13 @@ def _param_save(args: argparse.Namespace) -> None:
         return found, client.vehicle.name
 
     found, vehicle = _converse(args, _after_connecting(script))
-    params.write_file(args.file, found, vehicle)
+    parameter_files.write(args.file, found, vehicle)
     print(f"{len(found)} parameters written to {args.file}")
 
 
 def _param_load(args: argparse.Namespace) -> None:
-    wanted = params.read_file(args.file)
-    changed = _converse(args, _after_connecting(lambda c: params.apply_file(c, args.file, wanted)))
+    wanted = parameter_files.read(args.file)
+    changed = _converse(args, _after_connecting(lambda c: parameter_files.apply(c, args.file, wanted)))
     for old, new in changed:
         print(f"{new.name} = {new.text} (was {old.text})")
     print(f"{len(changed)} of {len(wanted)} parameters changed")

@@ -42,6 +42,7 @@ examples:
   sitl run --wind 1,0,0 --gust 0.5 --seed 7        air moving north at 1 m/s, with gusts
   sitl run --listen 0.0.0.0 --gcs 192.168.1.20:14550    a ground station on another machine
   sitl run --set RATE_Y_P=0.4 --set SIM_TLM_RATE=100    parameters, as if written over the link
+  sitl run --gains found.yaml                      the gains that 'gcs tune auto' has found
   sitl run --hil-viewer                            shown by a viewer made for PX4's simulation in hardware
   sitl run --record                                every flight kept as .tlog and .mcap (`gcs log list` shows them)
   sitl run --instance 1 --record logs              a second vehicle, its flights kept in the folder logs
@@ -166,6 +167,11 @@ def _add_simulation(parser: argparse.ArgumentParser, speed: str) -> None:
         default=1,
         metavar="N",
         help="of gusts and sensor noise (1)",
+    )
+    parser.add_argument(
+        "--gains",
+        metavar="NAME|FILE",
+        help="fly with these gains instead of the vehicle's: paper, tuned, or a YAML file",
     )
     parser.add_argument(
         "--set",
@@ -315,6 +321,7 @@ def _run(args: argparse.Namespace) -> int:
         seed=args.seed,
         identity=args.identity,
         ground_stations=tuple(args.gcs),
+        gains=args.gains,
         settings=tuple(args.set),
         state_dir=args.state_dir,
         zenoh_endpoint=args.zenoh_endpoint,

@@ -95,6 +95,11 @@ def load_gains(path: Path) -> dict[str, float]:
     return gains
 
 
+def gains_named(name_or_path: str) -> dict[str, float]:
+    """The gains of a bundled set ('paper', 'tuned') or of a YAML file, by parameter name. Raises ConfigError."""
+    return load_gains(_resolve("gains", name_or_path, None))
+
+
 def with_airframe(
     spec: VehicleSpec, plant: Mapping[str, float], believed: Mapping[str, float]
 ) -> tuple[VehicleSpec, Airframe]:

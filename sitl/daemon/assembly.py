@@ -21,6 +21,7 @@ from sitl.telemetry import keys
 from sitl.telemetry.feed import Feed
 from sitl.telemetry.publisher import Publisher, ZenohUnavailableError, default_endpoint, open_session
 from sitl.vehicle import DEFAULT_HOME, Vehicle, load_vehicle
+from sitl.vehicle_spec import gains_named
 
 
 def build_vehicle(config: RunConfig) -> Vehicle:
@@ -36,10 +37,14 @@ def build_vehicle(config: RunConfig) -> Vehicle:
             wind_N=config.wind_N_m_s,
             gust_m_s=config.gust_m_s,
             store=FolderStore(config.state_dir),
-            overrides={"SIM_SPEED": config.speed, **dict(config.settings)},
+            overrides={"SIM_SPEED": config.speed, **_gains(config), **dict(config.settings)},
         )
     except ConfigError as error:
         raise SettingError(str(error)) from None
+
+
+def _gains(config: RunConfig) -> dict[str, float]:
+    return gains_named(config.gains) if config.gains is not None else {}
 
 
 def build_endpoint(config: RunConfig, vehicle: Vehicle, recorder: Recorder | None, signer: Signer | None) -> Endpoint:

@@ -53,6 +53,7 @@ class RunConfig(NamedTuple):
     seed: int = 1
     identity: str = "px4"
     ground_stations: tuple[Address, ...] = ()
+    gains: str | None = None  # a bundled set or a file; None: the vehicle's own, and what is stored
     settings: tuple[tuple[str, float], ...] = ()
     state_dir: Path | None = None  # None: default_state_dir
     zenoh_endpoint: str | None = None  # None: the instance's own loopback port

@@ -7,9 +7,10 @@ from typing import Any
 import pytest
 from gcs_tools_stand_in import Pair, StandIn
 
-from gcs_tools import params
+from gcs_tools import parameter_files, params
 from gcs_tools.client import Client, LinkError, Script
 from gcs_tools.params import Parameter, number_text
+from sitl.control.gains import GAIN_NAMES
 from sitl.mavlink.wire import float32
 from sitl.strict_yaml import ConfigError
 
@@ -86,14 +87,14 @@ def test_a_refused_write_says_why_and_what_stays(name: str, value: float, messag
 def test_a_file_written_and_loaded_again_changes_nothing(tmp_path: Path) -> None:
     vehicle, path = StandIn(), tmp_path / "all.yaml"
     vehicle.parameters |= {"RATE_Y_P": float32(0.1), "POS_X_P": float32(1e-7)}
-    params.write_file(path, talk(params.fetch_all, vehicle), "yawsitter")
-    assert talk(lambda c: params.apply_file(c, path, params.read_file(path)), vehicle) == []
+    parameter_files.write(path, talk(params.fetch_all, vehicle), "yawsitter")
+    assert talk(lambda c: parameter_files.apply(c, path, parameter_files.read(path)), vehicle) == []
 
 
 def test_a_loaded_file_writes_what_differs(tmp_path: Path) -> None:
     vehicle, path = StandIn(), tmp_path / "some.yaml"
     path.write_text("RATE_Y_P: 0.25\nPOS_X_P: 2.5\n")
-    changed = talk(lambda c: params.apply_file(c, path, params.read_file(path)), vehicle)
+    changed = talk(lambda c: parameter_files.apply(c, path, parameter_files.read(path)), vehicle)
     assert [(old.text, new.text) for old, new in changed] == [("0.5", "0.25")]
     assert vehicle.parameters["RATE_Y_P"] == 0.25
 
@@ -109,7 +110,7 @@ def test_a_file_with_a_mistake_names_the_line_and_writes_nothing(tmp_path: Path,
     vehicle, path = StandIn(), tmp_path / "some.yaml"
     path.write_text(text)
     with pytest.raises(LinkError) as caught:
-        talk(lambda c: params.apply_file(c, path, params.read_file(path)), vehicle)
+        talk(lambda c: parameter_files.apply(c, path, parameter_files.read(path)), vehicle)
     assert str(caught.value).endswith(message)
     assert vehicle.parameters["RATE_Y_P"] == 0.5
 
@@ -118,7 +119,45 @@ def test_a_file_that_is_no_list_of_numbers_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "some.yaml"
     path.write_text("RATE_Y_P: high\n")
     with pytest.raises(ConfigError, match=r"some\.yaml:1: "):
-        params.read_file(path)
+        parameter_files.read(path)
+
+
+def test_a_gains_file_is_loaded_as_the_parameters_it_holds() -> None:
+    vehicle = StandIn()
+    vehicle.parameters |= dict.fromkeys(GAIN_NAMES, 1.0)
+    path = Path("sitl/gains/tuned.yaml")
+    changed = talk(lambda c: parameter_files.apply(c, path, parameter_files.read(path)), vehicle)
+    assert len(changed) == 36
+    assert vehicle.parameters["RATE_Y_P"] == float32(0.386)
+    vehicle.parameter_limit = 5.0
+    vehicle.parameters["ATT_Y_P"] = 1.0
+    with pytest.raises(LinkError, match=r"tuned\.yaml:10: ATT_Y_P: value out of range; it stays 1"):
+        talk(lambda c: parameter_files.apply(c, path, parameter_files.read(path)), vehicle)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "# Onboard parameters\n1\t1\tRATE_Y_P\t0.250000\t9\n1\t1\tSIM_PAUSE\t1\t6\n",
+        "RATE_Y_P         0.250000\nSIM_PAUSE        1\n",
+        "RATE_Y_P,0.25\nSIM_PAUSE,1 # stop\n",
+    ],
+)
+def test_lists_of_other_ground_stations_are_read(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "some.param"
+    path.write_text(text)
+    assert {name: written.value for name, written in parameter_files.read(path).items()} == {
+        "RATE_Y_P": 0.25,
+        "SIM_PAUSE": 1.0,
+    }
+
+
+@pytest.mark.parametrize("text", ["RATE_Y_P 0.1\nRATE_Y_P high\n", "A 1\n1 2 3\n", "A 1\nA 2\n", "A 1\nB nan\n"])
+def test_a_list_that_cannot_be_read_names_the_line(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "some.param"
+    path.write_text(text)
+    with pytest.raises(ConfigError, match=r"some\.param:2: "):
+        parameter_files.read(path)
 
 
 @pytest.mark.parametrize(("value", "text"), [(40.0, "40"), (0.1, "0.1"), (-2.5, "-2.5"), (1e-7, "1e-07"), (7, "7")])
