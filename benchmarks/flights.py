@@ -14,7 +14,7 @@ from gcs_tools.reference import Waypoints
 from sitl.closed_loop import NOISE_COLUMNS, TRACE_COLUMNS, LoopState
 from sitl.control.guidance import Effort, Guidance
 from sitl.control.reference import DEGREE, Trajectory
-from sitl.loop_arrays import LOOP_SIZE, OBSERVED_SIZE, put_loop, run_in_place, state_of
+from sitl.loop_arrays import LOOP_SIZE, OBSERVED_SIZE, guidance_array, put_loop, run_in_place, state_of
 from sitl.model.rigid_body import State
 from sitl.onboard.mission import MissionState
 from sitl.onboard.modes import Mode
@@ -77,13 +77,13 @@ def fly_bare(flight: Bare, steps_at_once: int) -> float:
     none = np.zeros((0, NOISE_COLUMNS))
     loop, seen = np.zeros(LOOP_SIZE), np.zeros(OBSERVED_SIZE)
     put_loop(loop, flight.loop)
+    guidance = guidance_array(flight.guidance)
     now_us, left = 0, round(AIRBORNE_S * 1e6) // flight.step_us
     while left > 0:
         steps = min(left, steps_at_once)
         noise = random.standard_normal((steps, NOISE_COLUMNS)) if flight.noisy else none
         run_in_place(
-            flight.plants, flight.controllers, flight.guidance, loop, noise, now_us, flight.step_us, steps, _NO_TRACE,
-            seen,
+            flight.plants, flight.controllers, guidance, loop, noise, now_us, flight.step_us, steps, _NO_TRACE, seen,
         )  # fmt: skip
         now_us += steps * flight.step_us
         left -= steps

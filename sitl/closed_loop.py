@@ -249,11 +249,28 @@ def run(
     loop: its covariance is left as it is; the returned one is another.
     trace: (steps, len(TRACE_COLUMNS)) is filled with a row a step, or (0, …): no trace.
     """
+    own = LoopState(loop.state, loop.gusts, loop.sensors, copied(loop.estimate), loop.memory)
+    return run_on(plants, controllers, guidance, own, noise, start_us, dt_us, steps, trace)
+
+
+@kernel
+def run_on(
+    plants: Sequence[Plant],
+    controllers: Sequence[Controller],
+    guidance: Guidance,
+    loop: LoopState,
+    noise: Array,
+    start_us: int,
+    dt_us: int,
+    steps: int,
+    trace: Array,
+) -> tuple[LoopState, Observed]:
+    """`run`, but the covariance is `loop`'s own, changed in place."""
     plant, controller = plants[0], controllers[0]
     s, gusts, errors, memory = loop.state, loop.gusts, loop.sensors, loop.memory
     estimating, noisy = controller.estimating > 0.0, noise.shape[0] > 0
     gusty = noisy and plant.wind.gust_m_s > 0.0
-    estimate = copied(loop.estimate)
+    estimate = loop.estimate
     quiet = np.zeros(NOISES)
     dt_s = dt_us * 1e-6
     h_s = dt_s / plant.substeps

@@ -1,7 +1,8 @@
 """The closed loop over arrays that stay where they are: the way the vehicle crosses into compiled code.
 
-Numba takes nested tuples apart and builds them again on every call, 10 µs for the loop's state and what is observed of
-it: as much as five control steps. Here both live in flat arrays between calls, and become tuples inside.
+Numba takes nested tuples apart and builds them again on every call, 13 µs for the guidance, the loop's state and what
+is observed of it: as much as six control steps. Here all three live in flat arrays between calls, and become tuples
+inside.
 """
 
 import math
@@ -10,12 +11,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sitl.closed_loop import Controller, LoopState, Observed, Plant, run
+from sitl.closed_loop import Controller, LoopState, Observed, Plant, run_on
 from sitl.control.cascade import Command, Memory
 from sitl.control.disturbance import Disturbance, Flaps
 from sitl.control.feedforward import Trim
-from sitl.control.guidance import Guidance
-from sitl.control.reference import Reference
+from sitl.control.guidance import Actuation, Guidance, Steering
+from sitl.control.reference import DEGREE, Reference, Trajectory
 from sitl.estimation.error_state import ERRORS, Estimate
 from sitl.jit import kernel
 from sitl.model.rigid_body import State
@@ -28,6 +29,7 @@ Array = NDArray[np.float64]
 _GUSTS, _SENSORS, _ESTIMATE, _COVARIANCE, _MEMORY = 17, 22, 41, 64, 64 + ERRORS * ERRORS  # the state begins at 0
 LOOP_SIZE = _MEMORY + 51
 OBSERVED_SIZE = 52
+_PIECES = 22  # of a guidance's array: where its trajectory's segments begin
 _NAV, _COMMAND, _REFERENCE = slice(0, 13), slice(13, 28), slice(28, 42)
 
 
@@ -107,9 +109,6 @@ def _put_estimate(x: Array, i: int, e: Estimate) -> None:
     x[i + 16] = e.baro_offset_m
     _put3(x, i + 17, e.rates_B)
     _put3(x, i + 20, e.force_B)
-    for j in range(ERRORS):
-        for k in range(ERRORS):
-            x[_COVARIANCE + ERRORS * j + k] = e.covariance[j, k]
 
 
 @kernel
@@ -136,6 +135,15 @@ def _put_memory(x: Array, i: int, m: Memory) -> None:
 @kernel
 def put_loop(x: Array, loop: LoopState) -> None:
     """The loop's state into its array."""
+    _put_motion(x, loop)
+    for j in range(ERRORS):
+        for k in range(ERRORS):
+            x[_COVARIANCE + ERRORS * j + k] = loop.estimate.covariance[j, k]
+
+
+@kernel
+def _put_motion(x: Array, loop: LoopState) -> None:
+    """All of it but the covariance."""
     for i in range(17):
         x[i] = loop.state[i]
     for i in range(5):
@@ -145,11 +153,39 @@ def put_loop(x: Array, loop: LoopState) -> None:
     _put_memory(x, _MEMORY, loop.memory)
 
 
+def guidance_array(g: Guidance) -> Array:
+    """The guidance as one flat array, the trajectory's segments at its end: what `run_in_place` takes.
+
+    Build it where the guidance changes, not where it is used.
+    """
+    trajectory = g.trajectory
+    n = trajectory.start_s.shape[0]
+    x = np.empty(_PIECES + n + trajectory.coefficients.size)
+    x[:_PIECES] = (g.effort, *g[2:9], *g.steering, *g.actuation, trajectory.end_s)
+    x[_PIECES : _PIECES + n] = trajectory.start_s
+    x[_PIECES + n :] = trajectory.coefficients.ravel()
+    return x
+
+
+@kernel
+def guidance_of(x: Array) -> Guidance:
+    """The guidance from its array, with which it shares the trajectory."""
+    axis = DEGREE + 1
+    n = (x.shape[0] - _PIECES) // (1 + 4 * axis)
+    middle = _PIECES + n
+    return Guidance(
+        int(x[0]), Trajectory(x[_PIECES:middle], x[middle:].reshape((n, 4, axis)), x[_PIECES - 1]),
+        x[1], x[2], x[3], x[4], x[5], x[6], x[7],
+        Steering(x[8], x[9], x[10], x[11], x[12], x[13], x[14], x[15], x[16]),
+        Actuation(x[17], x[18], x[19], x[20]),
+    )  # fmt: skip
+
+
 @kernel
 def run_in_place(
     plants: Sequence[Plant],
     controllers: Sequence[Controller],
-    guidance: Guidance,
+    guidance: Array,
     loop: Array,
     noise: Array,
     start_us: int,
@@ -158,9 +194,13 @@ def run_in_place(
     trace: Array,
     observed: Array,
 ) -> None:
-    """`closed_loop.run` with the state in `loop` (LOOP_SIZE) and what is seen in `observed` (OBSERVED_SIZE)."""
-    state, seen = run(plants, controllers, guidance, loop_of(loop), noise, start_us, dt_us, steps, trace)
-    put_loop(loop, state)
+    """`closed_loop.run` with the state in `loop` (LOOP_SIZE) and what is seen in `observed` (OBSERVED_SIZE).
+
+    guidance: as `guidance_array` makes it.
+    """
+    flown = guidance_of(guidance)
+    state, seen = run_on(plants, controllers, flown, loop_of(loop), noise, start_us, dt_us, steps, trace)
+    _put_motion(loop, state)  # the covariance is there
     for i in range(13):
         observed[i] = seen.nav[i]
     for i in range(15):

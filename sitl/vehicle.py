@@ -22,6 +22,7 @@ from sitl.loop_arrays import (
     LOOP_SIZE,
     OBSERVED_SIZE,
     accuracy_of,
+    guidance_array,
     loop_of,
     nav_of,
     observed_of,
@@ -145,6 +146,7 @@ class Vehicle:
         self._next_tick_us = self.now_us
         self.commander.restart(self.heading_rad)
         self._guidance = self.commander.guidance
+        self._flown: Guidance | None = None  # what the guidance's array says
         self._run(0, _NO_TRACE, self._guidance)
 
     @property
@@ -245,9 +247,11 @@ class Vehicle:
 
     def _run(self, steps: int, trace: np.ndarray[Any, np.dtype[np.float64]], guidance: Guidance) -> None:
         noise = self._random.standard_normal((steps, NOISE_COLUMNS)) if self._noisy and steps else _NO_NOISE
+        if guidance is not self._flown:
+            self._flown, self._guidance_array = guidance, guidance_array(guidance)
         run_in_place(
-            self._plants, self._controllers, guidance, self._loop_array, noise, self.now_us, self.step_us, steps,
-            trace, self._observed_array,
+            self._plants, self._controllers, self._guidance_array, self._loop_array, noise, self.now_us, self.step_us,
+            steps, trace, self._observed_array,
         )  # fmt: skip
         self.now_us += steps * self.step_us
         self.events.now_us = self.now_us
