@@ -102,6 +102,18 @@ def _system(text: str) -> int:
     return int(text)
 
 
+def _instance(text: str) -> int:
+    if not text.isdecimal() or int(text) > 254:
+        raise argparse.ArgumentTypeError(f"'{text}' is not an instance (0 to 254)")
+    return int(text)
+
+
+def _port(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text) <= 65535:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a port (1 to 65535)")
+    return int(text)
+
+
 def parser() -> argparse.ArgumentParser:
     link = argparse.ArgumentParser(add_help=False)
     link.add_argument(
@@ -207,6 +219,28 @@ def parser() -> argparse.ArgumentParser:
     mode.add_argument("mode", choices=MODES)
     watch = add(commands, "watch", "show the vehicle's state live, until Ctrl-C", "  gcs watch\n  gcs watch --for 10")
     watch.add_argument("--for", dest="seconds", type=_positive, metavar="S", help="stop after so long")
+
+    view = commands.add_parser(
+        "view",
+        help="show vehicles on a web page",
+        description="Serve a web page on which vehicles are seen flying, fed by their Zenoh telemetry. Until Ctrl-C.\n"
+        "Needs pip install 'yawsitter-sitl[view]'.",
+        epilog="examples:\n  gcs view\n  gcs view --instance 0 --instance 1\n"
+        "  gcs view --connect tcp/127.0.0.1:7450 --port 8081",
+        formatter_class=_Raw,
+        allow_abbrev=False,
+    )
+    view.add_argument(
+        "--connect",
+        action="append",
+        metavar="ENDPOINT",
+        help="a vehicle's Zenoh endpoint, may be repeated (tcp/127.0.0.1:7447 plus the instance)",
+    )
+    view.add_argument(
+        "--instance", action="append", type=_instance, metavar="N", help="show this vehicle, may be repeated (0)"
+    )
+    view.add_argument("--host", default="127.0.0.1", metavar="ADDRESS", help="serve here (127.0.0.1: this machine)")
+    view.add_argument("--port", type=_port, default=8080, metavar="PORT", help="serve here (8080)")
     return top
 
 

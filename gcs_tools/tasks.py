@@ -159,6 +159,12 @@ def _watch(args: argparse.Namespace) -> None:
         link.run(client, watch.update)
 
 
+def _view(args: argparse.Namespace) -> None:
+    from gcs_tools.view.run import run as view
+
+    view(args)
+
+
 def _say(make: Callable[[argparse.Namespace, Client], Script[str]]) -> Callable[[argparse.Namespace], None]:
     """A command whose script returns what to print."""
     return lambda args: print(_converse(args, lambda client: make(args, client)))
@@ -178,6 +184,7 @@ _TASKS: dict[str, Callable[[argparse.Namespace], None]] = {
     "param": _param,
     "log": _log,
     "watch": _watch,
+    "view": _view,
     "arm": _say(lambda args, client: commands.arm(client, force=args.force)),
     "disarm": _say(lambda args, client: commands.disarm(client, force=args.force)),
     "takeoff": _say(lambda args, client: commands.takeoff(client, height_m=args.height, wait=args.wait)),

@@ -1,0 +1,83 @@
+"""`gcs view`: put source and page together, and run them until Ctrl-C."""
+
+import argparse
+import contextlib
+import importlib.util
+import io
+import logging
+import socket
+import time
+from collections.abc import Iterator
+from typing import Any
+
+from sitl.strict_yaml import ConfigError
+
+TURN_S = 1.0 / 30.0  # between two updates of the page
+
+
+def run(args: argparse.Namespace) -> None:
+    """Raises ConfigError, KeyboardInterrupt."""
+    _need("viser")
+    from gcs_tools.view.page import Page
+
+    with contextlib.ExitStack() as stack:
+        source = _live(args)
+        stack.callback(source.close)
+        server = open_server(args.host, args.port)
+        stack.callback(server.stop)
+        page = Page(server, source)
+        print(f"gcs view: http://{args.host}:{args.port}  {source.status.text}", flush=True)
+        turn(page)
+
+
+def turn(page: Any) -> None:
+    """Update the page at even times; what can't be kept is left out."""
+    due_s = time.monotonic()
+    while True:
+        page.tick(time.monotonic())
+        due_s = max(due_s + TURN_S, time.monotonic())
+        time.sleep(max(0.0, due_s - time.monotonic()))
+
+
+def _need(package: str) -> None:
+    if importlib.util.find_spec(package) is None:
+        raise ConfigError(f"the page needs the package {package}: pip install 'yawsitter-sitl[view]'")
+
+
+def _live(args: argparse.Namespace) -> Any:
+    from gcs_tools.view.feed import Feed, FeedError, endpoint_of
+
+    instances = args.instance or ([] if args.connect else [0])
+    try:
+        return Feed(args.connect or [endpoint_of(k) for k in instances], args.instance or [])
+    except FeedError as error:
+        raise ConfigError(f"--connect: {error}") from None
+
+
+def open_server(host: str, port: int) -> Any:
+    """viser's server, quietly. Raises ConfigError where the port can't be had."""
+    import viser
+
+    try:
+        with socket.create_server((host, port)):
+            pass
+    except OverflowError:
+        raise ConfigError(f"--port {port}: a port is 1 to 65535") from None
+    except OSError as error:
+        reason = "is taken" if error.errno == 98 else f"can't be used: {error.strerror}"
+        raise ConfigError(f"{host}:{port} {reason}; choose another with --port") from None
+    for name in ("websockets", "websockets.server"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # a browser that goes away is no error
+    with _quiet():
+        server = viser.ViserServer(host, port, label="YawSitter", verbose=False)
+    if server.get_port() != port:  # somebody was quicker
+        server.stop()
+        raise ConfigError(f"{host}:{port} is taken; choose another with --port")
+    return server
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """viser prints its addresses in a box, whatever it is told."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        yield
