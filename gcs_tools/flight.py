@@ -29,6 +29,7 @@ START_WITHIN_M = 1.0  # of the flight's first point
 GROUND_M = 0.1  # a reference lower than this at its end is a landing
 LANDING_S = 120.0  # of the vehicle's time
 HOME_WITHIN_M = 10_000.0
+ELSEWHERE_S = 2.0  # in another mode, after which an uploaded flight counts as given up by the vehicle
 SETTLE_S = 5.0  # after a completed mission, for the vehicle to disarm by itself
 MISSION_COMPLETE = 5  # MISSION_STATE
 _MISSION_MODES = ("mission", "return", "land")
@@ -247,7 +248,7 @@ class Flight:
                     return
             elif v.mode not in _MISSION_MODES:  # a completed mission may tell its mode before its state
                 elsewhere_s = t if elsewhere_s is None else elsewhere_s
-                if t - elsewhere_s > 2.0:
+                if t - elsewhere_s > ELSEWHERE_S:
                     raise LinkError(self._left("mission"))
             yield math.inf
         yield from self.client.wait(lambda: v.mission_state == MISSION_COMPLETE, 2.0, self._left("mission"))

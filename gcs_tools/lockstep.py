@@ -38,8 +38,10 @@ class Flown(NamedTuple):
     factor: float  # simulation time over wall time, from the first turn to the last
 
 
-def fly(plan: Plan, vehicle: Vehicle, *, speed: float = math.inf, quiet: bool = True) -> Flown:
-    """Fly a plan from its first message to its last. speed: of real time, at most.
+def fly(
+    plan: Plan, vehicle: Vehicle, *, speed: float = math.inf, quiet: bool = True, limit_s: float = LIMIT_S
+) -> Flown:
+    """Fly a plan from its first message to its last, or so far. speed: of real time, at most.
 
     The flight's own failure is in Flown.flight.client.fault.
     """
@@ -47,7 +49,7 @@ def fly(plan: Plan, vehicle: Vehicle, *, speed: float = math.inf, quiet: bool = 
     flight = Flight(plan, client)
     vehicle.advance(TURN_US)  # kernels compiled and caches warm before the clock starts
     start_us, start_s = vehicle.now_us, now_s()
-    end_us = start_us + int(LIMIT_S * 1e6)
+    end_us = start_us + int(limit_s * 1e6)
     turns = 0
     with Progress(flight, quiet=quiet) as progress:
         while not client.finished and vehicle.now_us < end_us:

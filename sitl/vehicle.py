@@ -289,6 +289,11 @@ class Vehicle:
         self.commander.watch_battery(self._remaining)
 
     @property
+    def energy_J(self) -> float:
+        """Drawn from the battery since it was switched on."""
+        return self._energy_J
+
+    @property
     def _used_mAh(self) -> float:
         return self._energy_J / (0.5 * (_FULL_V + _EMPTY_V)) / 3.6
 

@@ -346,10 +346,10 @@ class Endpoint:
     def _tell_reached(self, event: Event) -> None:
         self._link.broadcast(message("MISSION_ITEM_REACHED", seq=event.value))
 
-    def _tell_stream(self, name: str) -> None:
+    def _tell_stream(self, *names: str) -> None:
         """What normally flows slowly, at once."""
         view = self._link.view()
-        for k in BY_ID[by_name(name).id]:
+        for k in (k for name in names for k in BY_ID[by_name(name).id]):
             payload = STREAMS[k].payload(view)
             if payload:
                 self._link.broadcast_packed(STREAMS[k].definition, payload)
@@ -361,7 +361,7 @@ class Endpoint:
         EventKind.ITEM_CURRENT: lambda self, _event: self._tell_stream("MISSION_CURRENT"),
         EventKind.PLAN: lambda self, _event: self._tell_stream("MISSION_CURRENT"),
         EventKind.FENCE: lambda self, _event: self._tell_stream("FENCE_STATUS"),
-        EventKind.MODE: lambda self, _event: self._tell_stream("CURRENT_MODE"),
+        EventKind.MODE: lambda self, _event: self._tell_stream("CURRENT_MODE", "MISSION_CURRENT"),
         EventKind.LANDED: lambda self, _event: self._tell_stream("EXTENDED_SYS_STATE"),
         EventKind.HOME: lambda self, _event: self._tell_stream("HOME_POSITION"),
     }
