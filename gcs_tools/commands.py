@@ -1,8 +1,13 @@
-"""One-shot commands to a vehicle: arm, disarm, takeoff, land, hold, return, mode. Each is a script of a Client."""
+"""One-shot commands to a vehicle: arm, disarm, takeoff, land, hold, return, mode, a mission's start.
+
+Each is a script of a Client.
+"""
 
 import math
 
 from gcs_tools.client import SEEN_S, Client, LinkError, Script
+from gcs_tools.plan import Uploaded
+from gcs_tools.upload import hand_over
 from sitl.mavlink.codec import mav
 
 NAN = math.nan
@@ -73,3 +78,15 @@ def mode(client: Client, name: str) -> Script[str]:
     yield from client.connect()
     yield from client.set_mode(name)
     return f"mode {name}"
+
+
+def mission(client: Client, plan: Uploaded) -> Script[str]:
+    """Hand a mission over and start it, from the ground or in the air."""
+    yield from client.connect()
+    yield from hand_over(client, plan)
+    v = client.vehicle
+    if not v.armed:
+        yield from client.arm()
+    yield from client.require("starting the mission", mav.MAV_CMD_MISSION_START, 0.0, 0.0)
+    yield from client.wait(lambda: v.mode == "mission", SEEN_S, "the mission was started but its mode isn't in force")
+    return f"mission {plan.name} under way"

@@ -16,7 +16,7 @@ from gcs_tools.metrics import Metrics, TooFewSamplesError, Track, evaluate
 from gcs_tools.plan import Plan, Streamed, Uploaded
 from gcs_tools.recording import Recording
 from gcs_tools.reference import Vector
-from gcs_tools.upload import upload
+from gcs_tools.upload import hand_over
 from sitl.mavlink import codec
 from sitl.mavlink.codec import mav
 
@@ -28,7 +28,6 @@ ARMING_PATIENCE_S = 8.0
 START_WITHIN_M = 1.0  # of the flight's first point
 GROUND_M = 0.1  # a reference lower than this at its end is a landing
 LANDING_S = 120.0  # of the vehicle's time
-HOME_WITHIN_M = 10_000.0
 ELSEWHERE_S = 2.0  # in another mode, after which an uploaded flight counts as given up by the vehicle
 SETTLE_S = 5.0  # after a completed mission, for the vehicle to disarm by itself
 MISSION_COMPLETE = 5  # MISSION_STATE
@@ -210,14 +209,7 @@ class Flight:
 
     def _uploaded(self, plan: Uploaded) -> Script[None]:
         client, v = self.client, self.client.vehicle
-        if plan.home is not None:
-            client.request("HOME_POSITION")
-            yield from client.wait(lambda: v.home is not None, 5.0, "the vehicle doesn't tell its home")
-            assert v.home is not None
-            away = _ground_distance_m(v.home, plan.home)
-            if away > HOME_WITHIN_M:
-                raise LinkError(f"the plan's home is {away / 1000:.0f} km from the vehicle's: start the vehicle there")
-        yield from upload(client, plan.items)
+        yield from hand_over(client, plan)
         self._note(f"{len(plan.items)} mission items uploaded")
         client.on["MISSION_ITEM_REACHED"] = self._item_reached
         yield from client.arm(ARMING_PATIENCE_S)
@@ -340,12 +332,3 @@ class Flight:
     def _note(self, text: str) -> None:
         t = self.t_s
         self.notes.append(f"t = {t:.1f} s: {text}" if math.isfinite(t) else text)
-
-
-def _ground_distance_m(a: tuple[float, ...], b: tuple[float, ...]) -> float:
-    """Between two (latitude, longitude) in degrees, on a sphere; good for telling towns apart."""
-    lat_a, lon_a, lat_b, lon_b = (math.radians(x) for x in (*a[:2], *b[:2]))
-    haversine = (
-        math.sin((lat_b - lat_a) / 2) ** 2 + math.cos(lat_a) * math.cos(lat_b) * math.sin((lon_b - lon_a) / 2) ** 2
-    )
-    return 2 * 6_371_000.0 * math.asin(math.sqrt(min(1.0, haversine)))

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from gcs_tools import params
 from gcs_tools.client import Client, LinkError, Script
-from gcs_tools.params import Parameter
+from gcs_tools.parameter import Parameter
 from sitl import strict_yaml
 from sitl.strict_yaml import ConfigError
 from sitl.vehicle_spec import load_gains

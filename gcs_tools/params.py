@@ -1,47 +1,18 @@
-"""The vehicle's parameters over the link: list, read, write.
-
-Integers travel as their bytes in the message's float (MAVLink's bytewise encoding, PX4's).
-"""
+"""The vehicle's parameters over the link: list, read, write."""
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 from gcs_tools.client import RETRY_S, TRIES, Client, LinkError, Script
+from gcs_tools.parameter import NOT_IN_LIST, Parameter, is_hash
 from sitl.mavlink import codec
 from sitl.mavlink.codec import mav
-from sitl.mavlink.wire import float32, float_of_int, int_of_float
+from sitl.mavlink.wire import float32, float_of_int
 
 _REAL32 = mav.MAV_PARAM_TYPE_REAL32
 _BY_NAME = -1  # param_index of a request by name
-_NOT_IN_LIST = 65535  # param_index of a value that isn't part of the list
 _ERRORS = ("", "no such parameter", "value out of range", "not allowed", "no such component", "read-only")
 _INT32 = range(-(2**31), 2**31)
-
-
-class Parameter(NamedTuple):
-    name: str
-    value: float  # an int where is_int
-    is_int: bool
-
-    @classmethod
-    def of(cls, m: Any) -> "Parameter":
-        is_int = m.param_type != _REAL32
-        return cls(m.param_id, int_of_float(m.param_value) if is_int else m.param_value, is_int)
-
-    @property
-    def text(self) -> str:
-        return number_text(self.value)
-
-
-def number_text(value: float) -> str:
-    """The shortest decimal that reads back as the same 32-bit float."""
-    if isinstance(value, int):
-        return str(value)
-    for digits in range(1, 10):
-        short = float(f"{value:.{digits}g}")
-        if float32(short) == float32(value):
-            return repr(short).removesuffix(".0")
-    return repr(value)
 
 
 class _Mailbox:
@@ -49,7 +20,8 @@ class _Mailbox:
 
     def __init__(self, client: Client) -> None:
         self._client = client
-        self.values: dict[str, Parameter] = {}
+        self.values: dict[str, Parameter] = {}  # the newest
+        self.told: dict[str, set[float]] = {}  # all, since they were asked for
         self.indices: set[int] = set()
         self.count: int | None = None
         self.errors: dict[str, int] = {}
@@ -65,10 +37,11 @@ class _Mailbox:
 
     def _value(self, m: Any) -> None:
         self.touched_s = self._client.wall_s
-        if m.param_index == _NOT_IN_LIST and m.param_id.startswith("_"):
-            return  # the hash over all parameters
-        self.values[m.param_id] = Parameter.of(m)
-        if m.param_index != _NOT_IN_LIST:
+        if is_hash(m):
+            return
+        self.values[m.param_id] = parameter = Parameter.of(m)
+        self.told.setdefault(m.param_id, set()).add(parameter.value)
+        if m.param_index != NOT_IN_LIST:
             self.indices.add(m.param_index)
             self.count = m.param_count
 
@@ -114,10 +87,11 @@ def fetch(client: Client, name: str) -> Script[Parameter]:
 def store(client: Client, name: str, value: float) -> Script[Parameter]:
     """Write a parameter and see it in force. Raises LinkError with the vehicle's reason where it is refused."""
     old = yield from fetch(client, name)
-    return (yield from _write(client, old, value))
+    return (yield from write(client, old, value))
 
 
-def _write(client: Client, old: Parameter, value: float) -> Script[Parameter]:
+def write(client: Client, old: Parameter, value: float) -> Script[Parameter]:
+    """Write a parameter whose present value is known; as `store` otherwise."""
     asked_s = client.wall_s
     if old.is_int and (value != int(value) or int(value) not in _INT32):
         raise LinkError(f"{old.name}: {value:g} refused: it takes whole numbers")
@@ -140,11 +114,13 @@ def _exchange(client: Client, name: str, request: Any, written: float | None = N
     """Send until PARAM_VALUE or PARAM_ERROR answers.
 
     Another value than what was written may have been on its way before; told again after another try it is the answer.
+    What was written and told counts, even if the vehicle has changed it since (a step that has been run reads 0).
     """
     with _Mailbox(client) as box:
         others = 0
         for _ in range(TRIES):
             box.values.pop(name, None)
+            box.told.pop(name, None)
             client.send(request)
             end_s = client.wall_s + RETRY_S
             while client.wall_s < end_s:
@@ -152,8 +128,8 @@ def _exchange(client: Client, name: str, request: Any, written: float | None = N
                 if name in box.errors:
                     code = box.errors[name]
                     raise LinkError(f"{name}: {_ERRORS[code] if 0 < code < len(_ERRORS) else f'error {code}'}")
-                if name in box.values and written in (None, box.values[name].value):
-                    return box.values[name]
+                if name in box.values and (written is None or written in box.told[name]):
+                    return box.values[name] if written is None else box.values[name]._replace(value=written)
             others += name in box.values
             if others == 2:
                 return box.values[name]
@@ -177,5 +153,5 @@ def apply(client: Client, wanted: Mapping[str, float]) -> Script[list[tuple[Para
     for name, value in wanted.items():
         old = present[name]
         if old.value != (int(value) if old.is_int else float32(value)):
-            changed.append((old, (yield from _write(client, old, value))))
+            changed.append((old, (yield from write(client, old, value))))
     return changed

@@ -5,6 +5,7 @@ from collections import deque
 from typing import Any, NamedTuple
 
 from gcs_tools.clock import VehicleClock
+from gcs_tools.parameter import Parameter, is_hash
 from gcs_tools.reference import Vector
 from sitl.mavlink.codec import mav
 
@@ -49,6 +50,7 @@ class VehicleState:
         self.home: tuple[float, float, float] | None = None  # degrees, degrees, metres AMSL
         self.mission_state = 0  # MISSION_STATE
         self.mission_item: int | None = None
+        self.parameters: dict[str, Parameter] = {}  # whoever asked for them, or changed them
         self.texts: deque[Text] = deque(maxlen=200)
         self._pieces: dict[int, list[str]] = {}
 
@@ -84,6 +86,10 @@ class VehicleState:
 
     def mission_current(self, m: Any, wall_s: float) -> None:
         self.mission_state, self.mission_item = m.mission_state, m.seq
+
+    def param_value(self, m: Any, wall_s: float) -> None:
+        if not is_hash(m):
+            self.parameters[m.param_id] = Parameter.of(m)
 
     def statustext(self, m: Any, wall_s: float) -> None:
         """Whole texts at once, those in pieces when the last piece has come."""
@@ -124,5 +130,6 @@ HANDLERS = {
     "DEBUG_VECT": VehicleState.debug_vect,
     "HOME_POSITION": VehicleState.home_position,
     "MISSION_CURRENT": VehicleState.mission_current,
+    "PARAM_VALUE": VehicleState.param_value,
     "STATUSTEXT": VehicleState.statustext,
 }

@@ -4,6 +4,7 @@ import pytest
 from gcs_tools_stand_in import Pair, StandIn
 
 from gcs_tools import commands, watch
+from gcs_tools import plan as plans
 from gcs_tools.client import Client, LinkError, Script
 from gcs_tools.link import Connection, parse_connection
 from gcs_tools.vehicle_state import VehicleState
@@ -101,6 +102,36 @@ def test_a_refused_mode_names_the_reason() -> None:
     client = Client()
     with pytest.raises(LinkError, match=r"^mode offboard: refused by the vehicle: offboard refused: no targets$"):
         run(client, commands.mode(client, "offboard"), vehicle)
+
+
+def test_a_mission_is_handed_over_and_started_on_the_ground_and_in_the_air() -> None:
+    plan = plans.load("missions/rectangle-mission.yaml")
+    for armed in (False, True):
+        vehicle = StandIn()
+        vehicle.armed = armed
+        client = Client()
+        assert run(client, commands.mission(client, plan), vehicle)[0] == "mission rectangle-mission under way"
+        assert len(vehicle.items) == len(plan.items)
+        assert vehicle.mode == "mission"
+        assert vehicle.armed
+
+
+def test_a_mission_drawn_for_another_town_stays_on_the_ground() -> None:
+    plan = plans.load("missions/rectangle-mission.plan")
+    client, vehicle = Client(), StandIn()
+    with pytest.raises(LinkError, match=r"the plan's home is .* km from the vehicle's"):
+        run(client, commands.mission(client, plan._replace(home=plans.Home(0.0, 0.0, 0.0))), vehicle)
+    assert not vehicle.items
+    assert not vehicle.armed
+
+
+def test_the_newest_value_of_a_parameter_is_known_whoever_changed_it() -> None:
+    client, vehicle = Client(), StandIn()
+    run(client, client.connect(), vehicle)
+    vehicle.parameters["RATE_Y_P"] = 0.75
+    vehicle._value("RATE_Y_P")
+    Pair(client, vehicle).turn()
+    assert client.vehicle.parameters["RATE_Y_P"].value == 0.75
 
 
 def test_a_vehicle_still_booting_is_waited_for() -> None:

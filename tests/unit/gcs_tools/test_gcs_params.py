@@ -9,7 +9,7 @@ from gcs_tools_stand_in import Pair, StandIn
 
 from gcs_tools import parameter_files, params
 from gcs_tools.client import Client, LinkError, Script
-from gcs_tools.params import Parameter, number_text
+from gcs_tools.parameter import Parameter, number_text
 from sitl.control.gains import GAIN_NAMES
 from sitl.mavlink.wire import float32
 from sitl.strict_yaml import ConfigError
@@ -64,6 +64,25 @@ def test_a_write_is_seen_in_force() -> None:
     assert talk(lambda c: params.store(c, "RATE_Y_P", 0.7), vehicle).text == "0.7"
     assert vehicle.parameters["RATE_Y_P"] == float32(0.7)
     assert talk(lambda c: params.store(c, "SIM_PAUSE", 1), vehicle) == Parameter("SIM_PAUSE", 1, True)
+
+
+def test_a_value_that_the_vehicle_uses_up_at_once_is_written_once() -> None:
+    class Stepping(StandIn):
+        """A step is run within the turn in which it is asked for: the parameter is told, and told again as 0."""
+
+        writes = 0
+
+        def _on_param_set(self, m: Any, back: dict[str, int]) -> None:
+            super()._on_param_set(m, back)
+            self.writes += 1
+            self.parameters["SIM_STEP_MS"] = 0
+            self._value("SIM_STEP_MS")
+
+    vehicle = Stepping()
+    vehicle.parameters["SIM_STEP_MS"] = 0
+    vehicle.int_parameters.add("SIM_STEP_MS")
+    assert talk(lambda c: params.store(c, "SIM_STEP_MS", 20), vehicle).value == 20
+    assert vehicle.writes == 1
 
 
 @pytest.mark.parametrize(
