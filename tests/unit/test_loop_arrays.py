@@ -54,3 +54,9 @@ def test_running_in_place_is_running() -> None:
     assert nav_of(seen) == observed.nav
     assert (traces[0] == traces[1]).all()
     assert traces[0].any()
+
+
+def test_all_vehicles_constants_are_of_the_one_type_that_numba_knows_already() -> None:
+    first, second = Vehicle(load_vehicle("yawsitter")), Vehicle(load_vehicle("yawsitter-real"))
+    assert first._plants.dtype is second._plants.dtype
+    assert first._controllers.dtype is second._controllers.dtype
