@@ -2,14 +2,15 @@
 
 Numba notices a change in a function's own file but not in the files of what it calls, so an edited force law could
 go on running in its old form inside a cached caller. The cache folder is therefore named by a digest of all kernel
-sources: any edit starts a fresh one. It lives in the user's cache folder ($NUMBA_CACHE_DIR, $XDG_CACHE_HOME or
-~/.cache), never in the installed package, which may be read-only.
+sources (files with kernels, and what they import): any edit there starts a fresh one. It lives in the user's cache
+folder ($NUMBA_CACHE_DIR, $XDG_CACHE_HOME or ~/.cache), never in the installed package, which may be read-only.
 
 With NUMBA_DISABLE_JIT=1 the same sources run as plain Python, for debuggers and coverage.
 """
 
 import hashlib
 import os
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -21,6 +22,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 _KEPT = 3  # cache folders of other versions that stay, newest first
 _SOURCES = Path(__file__).parent
+_IMPORT = re.compile(rb"^from sitl\.([\w.]+) import", re.MULTILINE)
 
 
 def _cache_root() -> Path:
@@ -31,10 +33,20 @@ def _cache_root() -> Path:
 
 
 def _digest() -> str:
+    sources = {}
+    for folder in ("", "model/", "control/", "estimation/"):
+        for path in (_SOURCES / folder).glob("*.py"):
+            sources[folder + path.stem] = path.read_bytes()
+    wanted = [name for name, source in sources.items() if b"\n@kernel\n" in source]
+    found: set[str] = set()
+    while wanted:
+        name = wanted.pop()
+        if name in sources and name not in found:
+            found.add(name)
+            wanted += (imported.decode().replace(".", "/") for imported in _IMPORT.findall(sources[name]))
     digest = hashlib.sha256(numba.__version__.encode())
-    for folder in ("", "model", "control", "estimation"):
-        for source in sorted((_SOURCES / folder).glob("*.py")):
-            digest.update(source.name.encode() + source.read_bytes())
+    for name in sorted(found):
+        digest.update(name.encode() + sources[name])
     return digest.hexdigest()[:16]
 
 
