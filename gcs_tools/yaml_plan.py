@@ -2,16 +2,15 @@
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from itertools import pairwise
-from typing import Annotated, Any, NoReturn, TypeVar
+from typing import Annotated, Any
 
 import msgspec
 
 from gcs_tools.plan import FRAME_LOCAL_NED, FRAME_MISSION, LOCAL_SCALE, Item, Plan, Streamed, Uploaded
 from gcs_tools.reference import PEAK_ACCELERATION, PEAK_SPEED, Circle, TimedPoint, Waypoints
-from sitl import strict_yaml
-from sitl.strict_yaml import ConfigError
+from sitl.strict_yaml import ConfigError, Document
 
 MAX_SPEED_M_S = 10.0  # far above what the vehicle tracks in hover; beyond it a file is surely mistyped
 MAX_ACCELERATION_M_S2 = 8.0
@@ -125,44 +124,11 @@ ITEMS: dict[str, tuple[Any, Callable[[Any], Item]]] = {
 DIRECTIONS = {"clockwise": 1, "anticlockwise": -1}
 PAPER_TABLES = ("rectangle", "circle")
 
-T = TypeVar("T", bound=msgspec.Struct)
-
-
-class _File:
-    """One mission file's text, for saying where a mistake stands."""
-
-    def __init__(self, text: str, name: str) -> None:
-        self.text, self.name = text, name
-
-    def fault(self, field: str, message: str) -> NoReturn:
-        line = strict_yaml.line_of(self.text, field)
-        raise ConfigError(f"{self.name}:{line}: {field or 'top level'}: {message}") from None
-
-    def choice(self, field: str, value: Any, allowed: Mapping[str, Any] | tuple[str, ...]) -> None:
-        if not isinstance(value, str) or value not in allowed:
-            self.fault(field, f"{value!r} is not one of {', '.join(allowed)}")
-
-    def convert(self, data: Any, into: type[T], prefix: str = "") -> T:
-        if isinstance(data, dict):
-            fields = msgspec.structs.fields(into)
-            for key in data:
-                if key not in {f.name for f in fields}:
-                    at = f"{prefix}.{key}".lstrip(".")
-                    self.fault(at, f"is not a field here; allowed: {', '.join(f.name for f in fields)}")
-            for field in fields:
-                if field.required and field.name not in data:
-                    self.fault(prefix, f"'{field.name}' is missing")
-        try:
-            return msgspec.convert(data, into)
-        except msgspec.ValidationError as error:
-            message, _, where = str(error).partition(" - at `$")
-            self.fault(f"{prefix}{where.rstrip('`')}".lstrip("."), message)
-
 
 def loads(text: str, name: str) -> Plan:
     """The Plan in the text of a YAML mission file; `name` stands for the file in messages."""
-    data = strict_yaml.loads(text, dict[str, Any], name)
-    file = _File(text, name)
+    file = Document(text, name)
+    data = file.data
     if "kind" not in data:
         file.fault("", f"'kind' is missing; allowed: {', '.join(KINDS)}")
     file.choice("kind", data["kind"], KINDS)
@@ -173,7 +139,7 @@ def loads(text: str, name: str) -> Plan:
     return plan
 
 
-def _waypoints(file: _File, m: _Waypoints) -> Plan:
+def _waypoints(file: Document, m: _Waypoints) -> Plan:
     points = [TimedPoint(p.t_s, p.at_m) for p in m.waypoints]
     if points[0].t_s != 0.0 or points[0].at_m[2] != 0.0:
         file.fault("waypoints[0]", "a flight starts on the ground: the first waypoint has t_s 0 and a down of 0")
@@ -194,7 +160,7 @@ def _waypoints(file: _File, m: _Waypoints) -> Plan:
     return _streamed(file, m, Waypoints(points), m.duration_s)
 
 
-def _circle(file: _File, m: _Circle) -> Plan:
+def _circle(file: Document, m: _Circle) -> Plan:
     file.choice("direction", m.direction, DIRECTIONS)
     if 2.0 * m.ramp_s > m.lap_s * m.laps:
         file.fault("ramp_s", f"{m.ramp_s:g} s up and down doesn't fit; allowed up to {m.lap_s * m.laps / 2:g} s")
@@ -220,7 +186,7 @@ def _circle(file: _File, m: _Circle) -> Plan:
     return _streamed(file, m, circle, circle.end_s)
 
 
-def _streamed(file: _File, m: _Timed, reference: Waypoints | Circle, duration_s: float) -> Streamed:
+def _streamed(file: Document, m: _Timed, reference: Waypoints | Circle, duration_s: float) -> Streamed:
     for i, t in enumerate(m.key_times_s):
         if t > duration_s:
             file.fault(f"key_times_s[{i}]", f"{t:g} s is after the end; allowed 0 to {duration_s:g} s")
@@ -228,7 +194,7 @@ def _streamed(file: _File, m: _Timed, reference: Waypoints | Circle, duration_s:
     return Streamed(m.name, file.name, reference, duration_s, m.key_times_s, heading, m.paper)
 
 
-def _mission(file: _File, m: _Mission) -> Plan:
+def _mission(file: Document, m: _Mission) -> Plan:
     items = []
     for i, raw in enumerate(m.items):
         if "do" not in raw:

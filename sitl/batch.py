@@ -55,10 +55,12 @@ class Outcome(NamedTuple):
     duration_s: of the measured flight. start_s, end_s: simulation times of its start, and of the vehicle's last stop.
     mae_m, rmse_m, iae_m_s, max_error_m, final_error_m: per axis of the position against the reference, over the
         measured flight at 50 Hz, as `metrics.evaluate` has them of the true positions.
+    mean_distance_m, max_distance_m: from the reference, in space, over the same samples.
     max_tilt_deg: the largest angle of the nose from straight up while measured (9.5° is a hover).
     least_height_m: above the start, while the reference was higher than HIGH_M; NaN where it never was.
     energy_J: drawn from the battery from switching on to the last stop.
     landed: whether the vehicle stood on its feet with its motors off in the end, end_N: where it was then.
+    tipped_over: whether it lay on the ground in the end.
     trace: (steps, len(TRACE_COLUMNS)) of every control step from start_s on, if asked for.
     """
 
@@ -71,10 +73,13 @@ class Outcome(NamedTuple):
     iae_m_s: Vec3
     max_error_m: Vec3
     final_error_m: Vec3
+    mean_distance_m: float
+    max_distance_m: float
     max_tilt_deg: float
     least_height_m: float
     energy_J: float
     landed: bool
+    tipped_over: bool
     end_N: Vec3
     trace: Array | None
 
@@ -301,6 +306,7 @@ class _Flight:
         vehicle, seen = self._vehicle, self._vehicle.snapshot()
         samples = np.array(self._samples).reshape(-1, 8)
         t, high = samples[:, 0], samples[:, 6] < -HIGH_M
+        distance = np.sqrt(np.sum((samples[:, 1:4] - samples[:, 4:7]) ** 2, axis=1))
         duration_s = self._duration_s if not math.isnan(self._duration_s) else float(t[-1]) if t.size else math.nan
         measured = t.size > 3
         m = evaluate(Track(t, samples[:, 4:7], samples[:, 1:4], _NONE, _NONE, _NONE), duration_s) if measured else None
@@ -314,13 +320,21 @@ class _Flight:
             iae_m_s=m.iae if m else _NAN,
             max_error_m=m.max_overshoot if m else _NAN,
             final_error_m=m.final_error if m else _NAN,
+            mean_distance_m=_mean(distance, t) if measured else math.nan,
+            max_distance_m=float(distance.max()) if measured else math.nan,
             max_tilt_deg=math.degrees(math.acos(max(-1.0, min(1.0, samples[:, 7].min())))) if t.size else math.nan,
             least_height_m=float(-samples[high, 3].max()) if high.any() else math.nan,
             energy_J=vehicle.energy_J,
             landed=not seen.armed and seen.landed is Landed.ON_GROUND and not seen.tipped_over,
+            tipped_over=seen.tipped_over,
             end_N=(seen.truth.north_m, seen.truth.east_m, seen.truth.down_m),
             trace=np.concatenate(self._traces) if self._traces else None,
         )
+
+
+def _mean(values: Array, t: Array) -> float:
+    """Over time, by the trapezoid rule."""
+    return float(np.sum(0.5 * (values[1:] + values[:-1]) * np.diff(t)) / (t[-1] - t[0]))
 
 
 def _single(value: float) -> float:

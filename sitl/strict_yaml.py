@@ -6,13 +6,15 @@ file, line and field it stands and what is allowed there.
 """
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NoReturn, TypeVar
 
 import msgspec
 import yaml
 
 T = TypeVar("T")
+S = TypeVar("S", bound=msgspec.Struct)
 
 
 class ConfigError(ValueError):
@@ -125,3 +127,39 @@ def line_of(text: str, field: str) -> int:
             break
         node = child
     return node.start_mark.line + 1 if node is not None else 1
+
+
+class Document:
+    """A YAML file of several parts, whose structure depends on what stands in it: read part by part.
+
+    text: its content; name: stands for the file in messages. Raises ConfigError.
+    """
+
+    def __init__(self, text: str, name: str) -> None:
+        self.text, self.name = text, name
+        self.data = loads(text, dict[str, Any], name)
+
+    def fault(self, field: str, message: str) -> NoReturn:
+        """Refuse the file because of what stands in `field` ('a[0].b')."""
+        raise ConfigError(f"{self.name}:{line_of(self.text, field)}: {field or 'top level'}: {message}") from None
+
+    def choice(self, field: str, value: Any, allowed: Mapping[str, Any] | tuple[str, ...]) -> None:
+        if not isinstance(value, str) or value not in allowed:
+            self.fault(field, f"{value!r} is not one of {', '.join(allowed)}")
+
+    def convert(self, data: Any, into: type[S], prefix: str = "") -> S:
+        """The part at `prefix` as a msgspec Struct; unknown fields are answered with those that there are."""
+        if isinstance(data, dict):
+            fields = msgspec.structs.fields(into)
+            for key in data:
+                if key not in {f.name for f in fields}:
+                    at = f"{prefix}.{key}".lstrip(".")
+                    self.fault(at, f"is not a field here; allowed: {', '.join(f.name for f in fields)}")
+            for field in fields:
+                if field.required and field.name not in data:
+                    self.fault(prefix, f"'{field.name}' is missing")
+        try:
+            return msgspec.convert(data, into)
+        except msgspec.ValidationError as error:
+            message, _, where = str(error).partition(" - at `$")
+            self.fault(f"{prefix}{where.rstrip('`')}".lstrip("."), message)

@@ -111,6 +111,9 @@ def test_figures_are_of_the_plant_and_its_seed() -> None:
     assert one == same
     assert one.mae_m != other.mae_m
     assert all(m <= r <= x for m, r, x in zip(one.mae_m, one.rmse_m, one.max_error_m, strict=True))
+    assert max(one.max_error_m) <= one.max_distance_m <= math.hypot(*one.max_error_m)
+    assert max(one.mae_m) <= one.mean_distance_m <= math.hypot(*one.rmse_m)
+    assert not one.tipped_over
     assert 9.0 < one.max_tilt_deg < 20.0
     assert 0.4 < one.least_height_m < 0.6
     assert 5e3 < one.energy_J < 2e4
