@@ -34,32 +34,38 @@ class Source(Protocol):
 
 
 class Page:
+    CAMERA_ORDER = 2.0  # of each browser's own row of buttons, between the choice of vehicle and the tabs
+
     def __init__(self, server: viser.ViserServer, source: Source, live: bool = True) -> None:
+        from gcs_tools.view.cameras import Cameras
         from gcs_tools.view.readouts import Readouts
         from gcs_tools.view.scene import Scene
+        from gcs_tools.view.view_tab import ViewTab
 
         self.server, self.source, self.live = server, source, live
         self.each_tick: list[Callable[[float], None]] = []
         self.selected: Vehicle | None = None
+        self.wall_s = 0.0  # of the tick under way, or the last
         gui = server.gui
         gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False, brand_color=BRAND_RGB)
         gui.main_panel.dock_right()
         gui.main_panel.set_width(340.0)
-        self._status = gui.add_markdown("")
+        self._status = gui.add_markdown("", order=0.0)
         self._said = ""
-        self._choice = gui.add_dropdown("Vehicle", ("none yet",), visible=False)
+        self._choice = gui.add_dropdown("Vehicle", ("none yet",), visible=False, order=1.0)
         self._offered: tuple[str, ...] = ()
-        self.tabs = gui.add_tab_group()
+        self.tabs = gui.add_tab_group(order=3.0)
         self.scene = Scene(server)
-        self._parts: list[Any] = [Readouts(self)]
+        self._parts: list[Any] = [Readouts(self), ViewTab(self), Cameras(self)]
 
     def tick(self, wall_s: float) -> None:
         """Take what the source has, and bring the page up to it."""
+        self.wall_s = wall_s
         self.source.poll(wall_s)
         with self.server.atomic():
             self._choose()
             self._say()
-            self.scene.update(self.source.vehicles, self.selected)
+            self.scene.update(self.source.vehicles, self.selected, wall_s)
             for part in self._parts:
                 part.update(self.selected, wall_s)
             for function in self.each_tick:

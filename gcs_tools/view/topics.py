@@ -77,6 +77,9 @@ class Mode(msgspec.Struct, frozen=True, gc=False):
     mission_plan_id: int
     home_N_m: Triple
     home_heading_deg: float
+    origin_lat_deg: float
+    origin_lon_deg: float
+    origin_alt_amsl_m: float
     speed_factor: float
     paused: bool
     battery_voltage_V: float

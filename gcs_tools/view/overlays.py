@@ -1,0 +1,126 @@
+"""What is drawn around one vehicle: where it was and should have been, home, wind, forces."""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from viser import SceneApi
+
+from gcs_tools.view import forces
+from gcs_tools.view.airframe_mesh import Dimensions
+from gcs_tools.view.history import INDEX
+from gcs_tools.view.topics import Triple
+from gcs_tools.view.vehicle import Instant, Vehicle
+
+TRAIL_S = 60.0
+TRAIL_POINTS = 400
+ERROR_FULL_M = 0.10  # where the trail's colour ends
+METRES_PER_N = 0.035
+WIND_METRES_PER_M_S = 0.25
+CALM_M_S = 0.05
+NOTHING = np.zeros((1, 2, 3), dtype=np.float32)
+_POSITION = [INDEX[name] for name in ("north_m", "east_m", "down_m")]
+_REFERENCE = [INDEX[name] for name in ("reference_north_m", "reference_east_m", "reference_down_m")]
+_SCALE_RGB = np.array([(40, 200, 190), (120, 220, 90), (250, 200, 60), (240, 70, 60)], dtype=float)
+
+
+def thinned(rows: NDArray[np.float64], most: int) -> NDArray[np.float64]:
+    """At most `most` of the rows, evenly, the same ones from call to call as the window moves on; the newest always."""
+    step = 1
+    while len(rows) > most * step:
+        step *= 2
+    kept = rows[::-step][::-1]
+    return kept
+
+
+def segments(points: NDArray[np.float64]) -> NDArray[np.float32]:
+    """A polyline (n, 3) as (n−1, 2, 3)."""
+    if len(points) < 2:
+        return NOTHING
+    return np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
+
+
+def error_colours(error_m: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """(n, 3) colours of distances from the reference: from teal at none over green and yellow to red."""
+    at = np.clip(error_m / ERROR_FULL_M, 0.0, 1.0) * (len(_SCALE_RGB) - 1)
+    known = np.arange(len(_SCALE_RGB))
+    return np.stack([np.interp(at, known, _SCALE_RGB[:, k]) for k in range(3)], axis=1).astype(np.uint8)
+
+
+class Shown(NamedTuple):
+    """What is to be drawn."""
+
+    trail: bool = True
+    reference: bool = True
+    wind: bool = True
+    wake: bool = True
+    forces: bool = False
+
+
+class Overlays:
+    """The nodes below `root`, a frame whose axes are N; forces hang on the body's own frame."""
+
+    def __init__(self, scene: SceneApi, root: str, d: Dimensions, ground_down_m: float) -> None:
+        self._d = d
+        self._trail = scene.add_line_segments(
+            f"{root}/trail", NOTHING, np.zeros((1, 2, 3), np.uint8), thickness=3.0, thickness_units="screen"
+        )
+        self._reference = scene.add_line_segments(
+            f"{root}/reference", NOTHING, (240, 240, 250), thickness=1.5, thickness_units="screen"
+        )
+        self._home = scene.add_frame(f"{root}/home", axes_length=0.25, axes_radius=0.006, origin_radius=0.012)
+        scene.add_label(f"{root}/home/label", "home", font_screen_scale=0.8)
+        self._ground_down_m = ground_down_m
+        self._wind: Any = scene.add_arrows(
+            f"{root}/wind", NOTHING, (120, 220, 255), shaft_radius=0.012, head_radius=0.035, head_length=0.08
+        )
+        self._wind_label = scene.add_label(f"{root}/wind_label", "", font_screen_scale=0.8, anchor="bottom-center")
+        self._forces: Any = scene.add_arrows(
+            f"{root}/body/forces", NOTHING, np.zeros((1, 3), np.uint8),
+            shaft_radius=0.006, head_radius=0.016, head_length=0.04,
+        )  # fmt: skip
+
+    def show(self, shown: Shown) -> None:
+        self._trail.visible, self._reference.visible = shown.trail, shown.reference
+        self._wind.visible = self._wind_label.visible = shown.wind
+        self._forces.visible = shown.forces
+
+    def update(self, vehicle: Vehicle, instant: Instant) -> None:
+        """What moves with the vehicle."""
+        if self._forces.visible:
+            self._draw_forces(instant)
+        if self._wind.visible:
+            self._draw_wind(instant.state.position_N_m, instant.state.wind_N_m_s)
+
+    def update_slowly(self, vehicle: Vehicle) -> None:
+        """What need not follow every instant."""
+        rows = thinned(vehicle.history.last(TRAIL_S), TRAIL_POINTS)
+        if len(rows) > 1 and self._trail.visible:
+            error_m = np.linalg.norm(rows[:, _POSITION] - rows[:, _REFERENCE], axis=1)
+            colours = error_colours(error_m)
+            self._trail.points = segments(rows[:, _POSITION])
+            self._trail.colors = np.stack([colours[:-1], colours[1:]], axis=1)
+        if len(rows) > 1 and self._reference.visible:
+            self._reference.points = segments(rows[:, _REFERENCE])
+        if vehicle.mode is not None:
+            north, east, down = vehicle.mode.home_N_m
+            self._home.position = (north, east, down + self._ground_down_m)
+
+    def _draw_wind(self, position_N_m: Triple, wind_N_m_s: Triple) -> None:
+        """Above the vehicle, with its middle over it."""
+        speed = math.hypot(*wind_N_m_s)
+        middle = np.add(position_N_m, (0.0, 0.0, -0.55))
+        if speed < CALM_M_S:
+            self._wind.points, self._wind_label.text = NOTHING, ""
+            return
+        half = 0.5 * WIND_METRES_PER_M_S * np.array(wind_N_m_s)
+        self._wind.points = np.array([[middle - half, middle + half]], dtype=np.float32)
+        self._wind_label.position = np.add(middle, (0.0, 0.0, -0.06))
+        self._wind_label.text = f"wind {speed:.1f} m/s"
+
+    def _draw_forces(self, instant: Instant) -> None:
+        arrows = forces.arrows(instant.loads.causes, instant.loads.total, self._d)
+        points = np.array([[a.at_B_m, np.add(a.at_B_m, np.multiply(METRES_PER_N, a.force_B_N))] for a in arrows])
+        self._forces.points = points.astype(np.float32) if len(arrows) else NOTHING
+        self._forces.colors = np.array([forces.colour(a.cause) for a in arrows] or [(0, 0, 0)], dtype=np.uint8)
