@@ -11,6 +11,7 @@ from benchmarks.processes import ROOT, BenchmarkError
 from gcs_tools import plan as plans
 from gcs_tools.plan import Streamed, Uploaded
 from gcs_tools.reference import Waypoints
+from sitl.calm_array import calm_array
 from sitl.closed_loop import NOISE_COLUMNS, TRACE_COLUMNS, LoopState
 from sitl.control.guidance import Effort, Guidance
 from sitl.control.reference import DEGREE, Trajectory
@@ -20,6 +21,7 @@ from sitl.onboard.mission import MissionState
 from sitl.onboard.modes import Mode
 from sitl.onboard.offboard import OffboardTarget
 from sitl.onboard.plan import MissionItem
+from sitl.tally import NOTHING, tally
 from sitl.vehicle import Vehicle, load_vehicle
 
 STREAM_US = 20_000  # between targets, and between two crossings into compiled code
@@ -78,12 +80,14 @@ def fly_bare(flight: Bare, steps_at_once: int) -> float:
     loop, seen = np.zeros(LOOP_SIZE), np.zeros(OBSERVED_SIZE)
     put_loop(loop, flight.loop)
     guidance = guidance_array(flight.guidance)
+    calm, nothing = calm_array(0.0), tally()
     now_us, left = 0, round(AIRBORNE_S * 1e6) // flight.step_us
     while left > 0:
         steps = min(left, steps_at_once)
         noise = random.standard_normal((steps, NOISE_COLUMNS)) if flight.noisy else none
         run_in_place(
             flight.plants, flight.controllers, guidance, loop, noise, now_us, flight.step_us, steps, _NO_TRACE, seen,
+            calm, nothing, NOTHING,
         )  # fmt: skip
         now_us += steps * flight.step_us
         left -= steps

@@ -33,20 +33,18 @@ def _cache_root() -> Path:
 
 
 def _digest() -> str:
-    sources = {}
-    for folder in ("", "model/", "control/", "estimation/"):
-        for path in (_SOURCES / folder).glob("*.py"):
-            sources[folder + path.stem] = path.read_bytes()
-    wanted = [name for name, source in sources.items() if b"\n@kernel\n" in source]
-    found: set[str] = set()
-    while wanted:
-        name = wanted.pop()
-        if name in sources and name not in found:
-            found.add(name)
-            wanted += (imported.decode().replace(".", "/") for imported in _IMPORT.findall(sources[name]))
+    paths = [path for folder in ("", "model", "control", "estimation") for path in (_SOURCES / folder).glob("*.py")]
+    found = {path: source for path in paths if b"\n@kernel\n" in (source := path.read_bytes())}
+    sources = list(found.values())
+    while sources:
+        for name in _IMPORT.findall(sources.pop()):
+            path = _SOURCES / f"{name.decode().replace('.', '/')}.py"
+            if path not in found and path.is_file():
+                found[path] = path.read_bytes()
+                sources.append(found[path])
     digest = hashlib.sha256(numba.__version__.encode())
-    for name in sorted(found):
-        digest.update(name.encode() + sources[name])
+    for path in sorted(found):
+        digest.update(path.name.encode() + found[path])
     return digest.hexdigest()[:16]
 
 

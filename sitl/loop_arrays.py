@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from sitl.calm_array import passes
 from sitl.closed_loop import Controller, LoopState, Observed, Plant, run_on
 from sitl.control.cascade import Command, Memory
 from sitl.control.disturbance import Disturbance, Flaps
@@ -24,6 +25,7 @@ from sitl.model.sensors import SensorState
 from sitl.model.wind import GustState
 from sitl.navigation import NavState
 from sitl.quaternion import Vec3
+from sitl.tally import TICK_US, sample
 
 Array = NDArray[np.float64]
 _GUSTS, _SENSORS, _ESTIMATE, _COVARIANCE, _MEMORY = 17, 22, 41, 64, 64 + ERRORS * ERRORS  # the state begins at 0
@@ -161,10 +163,15 @@ def guidance_array(g: Guidance) -> Array:
     trajectory = g.trajectory
     n = trajectory.start_s.shape[0]
     x = np.empty(_PIECES + n + trajectory.coefficients.size)
-    x[:_PIECES] = (g.effort, *g[2:9], *g.steering, *g.actuation, trajectory.end_s)
+    put_guidance(x, g)
     x[_PIECES : _PIECES + n] = trajectory.start_s
     x[_PIECES + n :] = trajectory.coefficients.ravel()
     return x
+
+
+def put_guidance(x: Array, g: Guidance) -> None:
+    """A guidance with the array's own trajectory into it."""
+    x[:_PIECES] = (g.effort, *g[2:9], *g.steering, *g.actuation, g.trajectory.end_s)
 
 
 @kernel
@@ -193,13 +200,29 @@ def run_in_place(
     steps: int,
     trace: Array,
     observed: Array,
-) -> None:
+    calm: Array,
+    tally: Array,
+    wanted: Array,
+) -> int:
     """`closed_loop.run` with the state in `loop` (LOOP_SIZE) and what is seen in `observed` (OBSERVED_SIZE).
 
-    guidance: as `guidance_array` makes it.
+    guidance: as `guidance_array` makes it. calm: as `calm_array` does; where the vehicle comes to a tick that it does
+    not pass over, the run ends before its last step. tally, wanted: see `tally.sample`. Returns the steps run.
     """
-    flown = guidance_of(guidance)
-    state, seen = run_on(plants, controllers, flown, loop_of(loop), noise, start_us, dt_us, steps, trace)
+    flown, state = guidance_of(guidance), loop_of(loop)
+    torque, now_us, done = plants[0].airframe.torque_coefficient, start_us, 0
+    while True:
+        to_tick_us = TICK_US - now_us % TICK_US
+        n = min(steps - done, (to_tick_us + dt_us - 1) // dt_us)
+        state, seen = run_on(
+            plants, controllers, flown, state, noise[done : done + n], now_us, dt_us, n, trace[done : done + n]
+        )
+        now_us += n * dt_us
+        done += n
+        if n > 0 and now_us % TICK_US == 0:
+            sample(tally, wanted, state.state, seen.reference, now_us)
+        if done >= steps or not passes(calm, flown.trajectory, seen.nav, seen.feet_down, torque, state.state, now_us):
+            break
     _put_motion(loop, state)  # the covariance is there
     for i in range(13):
         observed[i] = seen.nav[i]
@@ -211,6 +234,7 @@ def run_in_place(
     _put3(observed, 45, seen.specific_force_B)
     _put3(observed, 48, seen.acceleration_N)
     observed[51] = seen.feet_down
+    return done
 
 
 def state_of(loop: Array) -> State:

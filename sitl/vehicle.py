@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from sitl.calm_array import ENERGY_J, POWER_W, calm_array, put_calm
 from sitl.closed_loop import NOISE_COLUMNS, TRACE_COLUMNS, Controller, LoopState, Plant, knowing, start
 from sitl.control.disturbance import Bandwidth
 from sitl.control.gains import GAIN_NAMES, PerAxis, Settings, from_names
@@ -26,10 +27,12 @@ from sitl.loop_arrays import (
     loop_of,
     nav_of,
     observed_of,
+    put_guidance,
     put_loop,
     run_in_place,
     state_of,
 )
+from sitl.model import battery
 from sitl.model.airframe import Airframe
 from sitl.model.airframe import description as airframe_description
 from sitl.model.derivative import Load, by_cause
@@ -50,18 +53,17 @@ from sitl.quaternion import Vec3, rotate_back
 from sitl.records import packed
 from sitl.snapshot import Battery, Snapshot
 from sitl.strict_yaml import ConfigError
+from sitl.tally import NOTHING, TICK_US, tally
 from sitl.vehicle_spec import VehicleSpec, load_vehicle, vehicle_names, with_airframe
 
-__all__ = ["DEFAULT_HOME", "Load", "Vehicle", "load_vehicle", "vehicle_names", "with_airframe"]
+__all__ = ["DEFAULT_HOME", "TICK_US", "Load", "Vehicle", "load_vehicle", "vehicle_names", "with_airframe"]
 
 DEFAULT_HOME = GeoPoint(55.6985, 37.3595, 190.0)  # Skolkovo, where the paper's vehicle was built
-TICK_US = 20_000  # of the onboard logic
 _NO_TRACE = np.zeros((0, len(TRACE_COLUMNS)))
 Pilot = Callable[[float, NavState, Guidance], Guidance]
 _NO_NOISE = np.zeros((0, NOISE_COLUMNS))
-
-# a three-cell 2200 mAh pack, linear between full and empty; propulsion as a whole is half efficient
-_FULL_V, _EMPTY_V, _CAPACITY_MAH, _EFFICIENCY, _IDLE_W = 12.6, 10.5, 2200.0, 0.5, 3.0
+_NOISE_US = 4_000_000  # as long as noise is drawn for at once, where many steps are run at once
+_BATTERY_AHEAD_J = 1.0  # the battery is looked at so long before there is something to tell of it
 
 
 class Vehicle:
@@ -73,11 +75,14 @@ class Vehicle:
     controller takes the airframe to be (None: what it is). Raises ConfigError for an override that the parameter's
     declaration refuses.
 
+    restless: ticks every time, even where a tick is known to change nothing: the same flight, only slower.
+    tally, wanted: where a flight is summed up, see sitl.tally.
     pilot: asked before every control step, with the simulation time [s], the navigation state and what the onboard
     logic wants; what it returns is flown instead. Each step is then a crossing into compiled code of its own.
     """
 
     pilot: Pilot | None = None
+    restless = False
 
     def __init__(
         self,
@@ -139,14 +144,15 @@ class Vehicle:
         self._loop_array = np.zeros(LOOP_SIZE)
         self._observed_array = np.zeros(OBSERVED_SIZE)
         put_loop(self._loop_array, self._standing(state))
-        self._energy_J = 0.0
-        self._power_W = _IDLE_W
+        self._calm = calm_array(battery.IDLE_W)
+        self.tally, self.wanted = tally(), NOTHING
+        self._noise = _NO_NOISE  # drawn and not used yet
         self._snapshot: Snapshot | None = None
         self._snapshot_mark = -1
         self._next_tick_us = self.now_us
         self.commander.restart(self.heading_rad)
         self._guidance = self.commander.guidance
-        self._flown: Guidance | None = None  # what the guidance's array says
+        self._flown, self._guidance_array = self._guidance, guidance_array(self._guidance)
         self._run(0, _NO_TRACE, self._guidance)
 
     @property
@@ -245,24 +251,52 @@ class Vehicle:
     def loop(self, loop: LoopState) -> None:
         put_loop(self._loop_array, loop)
 
-    def _run(self, steps: int, trace: np.ndarray[Any, np.dtype[np.float64]], guidance: Guidance) -> None:
-        noise = self._random.standard_normal((steps, NOISE_COLUMNS)) if self._noisy and steps else _NO_NOISE
+    def _run(self, steps: int, trace: np.ndarray[Any, np.dtype[np.float64]], guidance: Guidance) -> int:
+        """Run so many steps, or as many as the calm in force lasts. Returns how many."""
         if guidance is not self._flown:
-            self._flown, self._guidance_array = guidance, guidance_array(guidance)
-        run_in_place(
+            if guidance.trajectory is self._flown.trajectory:
+                put_guidance(self._guidance_array, guidance)
+            else:
+                self._guidance_array = guidance_array(guidance)
+            self._flown = guidance
+        noise = self._drawn(steps) if self._noisy and steps else _NO_NOISE
+        run: int = run_in_place(
             self._plants, self._controllers, self._guidance_array, self._loop_array, noise, self.now_us, self.step_us,
-            steps, trace, self._observed_array,
+            steps, trace, self._observed_array, self._calm, self.tally, self.wanted,
         )  # fmt: skip
-        self.now_us += steps * self.step_us
+        if noise is not _NO_NOISE:
+            self._noise = noise[run:]
+        self.now_us += run * self.step_us
         self.events.now_us = self.now_us
+        return run
+
+    def _drawn(self, steps: int) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Noise of so many steps at least: what is left of the last drawing, then new."""
+        left = self._noise
+        if len(left) >= steps:
+            return left
+        fresh = self._random.standard_normal((steps - len(left), NOISE_COLUMNS))
+        return np.concatenate((left, fresh)) if len(left) else fresh
 
     def advance(self, until_us: int, trace: np.ndarray[Any, np.dtype[np.float64]] | None = None) -> None:
         """Run whole control steps up to simulation time `until_us`.
 
+        Ticks of the onboard logic are passed over where it can tell that they change nothing, but not the last one.
+
         trace: (steps, len(TRACE_COLUMNS)) filled with a row for every control step of this call.
         """
-        row = 0
+        self._advance(until_us, trace, news=False)
+
+    def advance_to_news(self, until_us: int, trace: np.ndarray[Any, np.dtype[np.float64]] | None = None) -> None:
+        """As `advance`, but to the end of the first tick that tells something in `events`."""
+        self._advance(until_us, trace, news=True)
+
+    def _advance(self, until_us: int, trace: np.ndarray[Any, np.dtype[np.float64]] | None, news: bool) -> None:
+        row, told = 0, self.events.next_number
+        last_tick_us = (until_us - 2 * self.step_us) // TICK_US * TICK_US
         while until_us - self.now_us >= self.step_us:
+            if news and self.events.next_number != told and self.now_us >= self._next_tick_us:
+                break
             self._build_constants()
             due = self.now_us >= self._next_tick_us
             if due or self.commander.changed:
@@ -274,37 +308,49 @@ class Vehicle:
             # where the control period does not divide the tick, the tick comes with the first step after it
             to_tick = -(-(self._next_tick_us - self.now_us) // self.step_us)
             steps = max(1, min((until_us - self.now_us) // self.step_us, to_tick))
+            long = last_tick_us > self._next_tick_us
+            if long:
+                steps = self._calm_steps(steps, last_tick_us)
             guidance = self._guidance
             if self.pilot is not None:
                 steps, guidance = 1, self.pilot(self.now_us * 1e-6, nav_of(self._observed_array), guidance)
-            self._run(steps, trace[row : row + steps] if trace is not None else _NO_TRACE, guidance)
-            row += steps
+            row += self._run(steps, trace[row : row + steps] if trace is not None else _NO_TRACE, guidance)
+            if long:
+                put_calm(self._calm, None)
+                if self.now_us >= self._next_tick_us + self.step_us:  # ticks were passed over
+                    since_us = self.now_us % TICK_US
+                    self._next_tick_us = self.now_us - since_us + (0 if since_us < self.step_us else TICK_US)
         self.commander.observe(self.now_us, nav_of(self._observed_array), int(self._observed_array[-1]))
 
+    def _calm_steps(self, steps: int, last_tick_us: int) -> int:
+        """How many steps may be run at once instead of `steps`; lays down the calm that ends them."""
+        calm = None if self.restless or self.pilot is not None else self.commander.calm()
+        if calm is None or calm.until_us <= self._next_tick_us:
+            return steps
+        most_J = battery.energy_J(self.commander.battery_lasts(self._remaining)) - _BATTERY_AHEAD_J
+        put_calm(self._calm, calm, int(self._observed_array[-1]), most_J)
+        end_us = min(last_tick_us, self._next_tick_us + _NOISE_US) if self._noisy else last_tick_us
+        return max(steps, -(-(end_us - self.now_us) // self.step_us))
+
     def _drain_battery(self) -> None:
-        s, a = state_of(self._loop_array), self.spec.airframe.airframe
-        cubes = abs(s.rotor_left_rad_s) ** 3 + abs(s.rotor_right_rad_s) ** 3
-        self._power_W = _IDLE_W + a.torque_coefficient * cubes / _EFFICIENCY
-        self._energy_J += self._power_W * TICK_US * 1e-6
+        power_W = battery.drawn_W(self.spec.airframe.airframe.torque_coefficient, state_of(self._loop_array))
+        self._calm[POWER_W] = power_W
+        self._calm[ENERGY_J] += power_W * TICK_US * 1e-6
         self.commander.watch_battery(self._remaining)
 
     @property
     def energy_J(self) -> float:
         """Drawn from the battery since it was switched on."""
-        return self._energy_J
-
-    @property
-    def _used_mAh(self) -> float:
-        return self._energy_J / (0.5 * (_FULL_V + _EMPTY_V)) / 3.6
+        return float(self._calm[ENERGY_J])
 
     @property
     def _remaining(self) -> float:
-        return max(0.0, 1.0 - self._used_mAh / _CAPACITY_MAH)
+        return battery.remaining(self.energy_J)
 
     def _battery(self) -> Battery:
         remaining = self._remaining
-        voltage = _EMPTY_V + (_FULL_V - _EMPTY_V) * remaining
-        return Battery(voltage, self._power_W / voltage, remaining, self._used_mAh)
+        voltage = battery.EMPTY_V + (battery.FULL_V - battery.EMPTY_V) * remaining
+        return Battery(voltage, float(self._calm[POWER_W]) / voltage, remaining, battery.used_mAh(self.energy_J))
 
     def snapshot(self) -> Snapshot:
         """The vehicle now; built afresh only when time has moved or something has happened."""

@@ -58,9 +58,13 @@ def _evaluate(c: NDArray[np.float64], t: float) -> tuple[float, float, float, fl
 def sample(trajectory: Trajectory, t_s: float) -> Reference:
     """The trajectory at simulation time t_s."""
     start = trajectory.start_s
-    k = start.shape[0] - 1
-    while k > 0 and t_s < start[k]:
-        k -= 1
+    first, k = 0, start.shape[0] - 1
+    while first < k:
+        middle = (first + k + 1) // 2
+        if t_s < start[middle]:
+            k = middle - 1
+        else:
+            first = middle
     resting = t_s < start[0] or t_s >= trajectory.end_s
     t = max(min(t_s, trajectory.end_s) - start[k], 0.0)
     c = trajectory.coefficients[k]

@@ -25,6 +25,10 @@ class BatteryWatch:
     def restart(self) -> None:
         self.level = Level.GOOD
 
+    def lasts(self, remaining: float) -> float:
+        """How full the battery is when the level may change next, 0 … 1."""
+        return max((self._p[name] for name in _THRESHOLDS.values() if self._p[name] <= remaining), default=0.0)
+
     def watch(self, remaining: float) -> Level | None:
         """The level, where it is worse than before."""
         level = next((level for level, name in _THRESHOLDS.items() if remaining < self._p[name]), Level.GOOD)

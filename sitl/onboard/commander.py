@@ -12,6 +12,7 @@ from sitl.control.reference import rest_at
 from sitl.geodesy import GeoPoint
 from sitl.navigation import NavState
 from sitl.onboard import arming
+from sitl.onboard.calm import FOREVER, Calm, before_us
 from sitl.onboard.events import EventLog
 from sitl.onboard.flight import FACING, Flight
 from sitl.onboard.footing import Footing
@@ -130,6 +131,25 @@ class Commander:
             self._footing.rest(feet_down)
         self.guidance = self._guidance()
         return self.guidance
+
+    def calm(self) -> Calm | None:
+        """What the ticks after the last one wait for, requests apart; None: the next may change something."""
+        mode, intent = self.mode, self._flight.intent(self.mode)
+        ground = self._footing.waits(self.armed, intent)
+        if self.changed or ground is None or (self.armed and self._watch.fenced):
+            return None
+        wait = self._flight.waits(mode, self._fix) if self.armed else FOREVER
+        if wait is None:
+            return None
+        until_us = before_us(wait.until_s)
+        if self.armed and self.standing and self._finished(intent.landing):
+            stands_s = self._footing.standing_s(self._fix.now_us)
+            until_us = min(until_us, before_us(self._fix.t_s + self._p["COM_DISARM_LAND"] - stands_s))
+        return Calm(until_us, ground, wait.near_N, wait.near_m)
+
+    def battery_lasts(self, remaining: float) -> float:
+        """How full the battery is when `watch_battery` may next do something."""
+        return self._watch.battery_lasts(remaining)
 
     def _guidance(self) -> Guidance:
         guide, aloft = self._guide, 0.0 if self._fix.feet_down > 0 else 1.0
@@ -308,9 +328,13 @@ class Commander:
         if self._footing.watch(fix, intent) and intent.landing:
             heading = self._guide.reference(fix).heading_rad
             self._guide.put(rest_at(fix.nav.north_m, fix.nav.east_m, 0.0, heading))
-        finished = intent.landing or (self.mode is Mode.MISSION and self._mission.state is MissionState.COMPLETE)
-        if self.standing and finished and self._footing.standing_s(fix.now_us) >= self._p["COM_DISARM_LAND"]:
+        long = self._footing.standing_s(fix.now_us) >= self._p["COM_DISARM_LAND"]
+        if self.standing and long and self._finished(intent.landing):
             self._disarm()
+
+    def _finished(self, landing: bool) -> bool:
+        """Whether a vehicle that has come to stand has nothing more to do in the air."""
+        return landing or (self.mode is Mode.MISSION and self._mission.state is MissionState.COMPLETE)
 
     def _watch_tilt(self) -> None:
         """Stop the motors of a vehicle that lies on the ground."""

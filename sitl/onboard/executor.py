@@ -5,6 +5,7 @@ from collections.abc import Callable
 from enum import Enum
 
 from sitl.geodesy import GeoPoint
+from sitl.onboard.calm import FOREVER, Wait
 from sitl.onboard.circles import Circle
 from sitl.onboard.events import EventLog
 from sitl.onboard.gaze import Gaze, Look
@@ -291,6 +292,30 @@ class Executor:
                 return False
         self._reached(index)
         return True
+
+    def waits(self, fix: Fix) -> Wait | None:
+        """What the current item waits for; None: `tick` is to go on looking."""
+        mission, guide = self._mission, self._guide
+        if self._revision != mission.revision:
+            return None
+        if self._complete and self.landing and guide.standing:
+            return FOREVER
+        if self._complete or not self._begun or (self.landing and guide.standing):
+            return None
+        item = mission.items[mission.current]
+        if self._rising or item.command == ItemCommand.LOITER_TURNS or (item.command in LANDINGS and not self.landing):
+            return Wait(guide.done_s)
+        if item.command in LANDINGS:
+            return self._landing.waits()
+        if self._wait_until_s is not None:
+            return Wait(self._wait_until_s)
+        if item.command == ItemCommand.CONDITION_YAW:
+            return None if guide.standing else Wait(guide.done_s)
+        if item.command == ItemCommand.CONDITION_DISTANCE:
+            return Wait(math.inf, self._point, max(item.param1, self._radius(item)))
+        if self._passes(item):
+            return Wait(guide.done_s, self._point, self._radius(item))
+        return Wait(math.inf, self._point, self._radius(item)) if guide.done(fix) else Wait(guide.done_s)
 
     # what an item says, and what comes after it
 

@@ -5,10 +5,11 @@ from collections.abc import Callable
 from sitl.control.reference import rest_at
 from sitl.geodesy import GeoPoint
 from sitl.onboard import ground
+from sitl.onboard.calm import Wait
 from sitl.onboard.events import EventLog
 from sitl.onboard.executor import Executor, Progress
 from sitl.onboard.following import Following
-from sitl.onboard.gaze import Gaze
+from sitl.onboard.gaze import Gaze, Look
 from sitl.onboard.guide import Fix, Guide
 from sitl.onboard.guided import Guided
 from sitl.onboard.homing import Homing, Stage
@@ -132,6 +133,24 @@ class Flight:
             return Happening.TARGETS_LOST
         self._following.tick(fix)
         return None
+
+    def waits(self, mode: Mode, fix: Fix) -> Wait | None:
+        """What the mode waits for with the trajectory in force; None: it may put another in force at any tick."""
+        faces = mode in FACING and not self.guide.standing
+        if faces and (self.guide.faced or self.gaze.look is not Look.AHEAD):
+            return None
+        waits = self._WAITS.get(mode)
+        return waits(self, fix) if waits is not None else None
+
+    _WAITS: dict[Mode, Callable[["Flight", Fix], Wait | None]] = {  # noqa: RUF012
+        Mode.HOLD: lambda self, fix: self.guided.waits(),
+        Mode.ORBIT: lambda self, fix: self.guided.waits(),
+        Mode.TAKEOFF: lambda self, fix: Wait(self.guide.done_s),
+        Mode.LAND: lambda self, fix: self._landing.waits(),
+        Mode.RETURN: lambda self, fix: self._homing.waits(),
+        Mode.MISSION: lambda self, fix: self._executor.waits(fix),
+        Mode.OFFBOARD: lambda self, fix: self._following.waits(),
+    }
 
     _MODES: dict[Mode, Callable[["Flight", Fix], Happening | None]] = {  # noqa: RUF012
         Mode.HOLD: lambda self, fix: self.guided.tick(fix),

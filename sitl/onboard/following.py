@@ -1,6 +1,8 @@
 """Offboard flight: the newest target in force, and a halt where the next one stays away."""
 
 from sitl.control.guidance import Steering
+from sitl.control.reference import Trajectory
+from sitl.onboard.calm import Wait
 from sitl.onboard.guide import Fix, Guide
 from sitl.onboard.offboard import AttitudeTarget, Offboard
 
@@ -19,13 +21,21 @@ class Following:
         self._seen = -1  # number of the target in force
         self._halting = False
         self.lifting: bool | None = None
+        self._ahead: Trajectory | None = None  # of foreseen targets
 
     def start(self) -> None:
-        self._seen, self._halting, self.lifting = -1, False, None
+        self._seen, self._halting, self.lifting, self._ahead = -1, False, None, None
         self._offboard.enter()
 
     def tick(self, fix: Fix) -> None:
         offboard, guide = self._offboard, self._guide
+        if offboard.foreseen is not None:
+            self._seen, self._halting, self.lifting = offboard.number, False, None
+            # a vehicle that stands has the heading that it stands at, if the targets tell none
+            if guide.trajectory is not self._ahead or (guide.standing and not offboard.foreseen.headed):
+                self._ahead = offboard.foreseen.trajectory(guide.motion(fix).heading_rad)
+                guide.put(self._ahead)
+            return
         if offboard.number != self._seen:
             self._seen, self._halting = offboard.number, False
             if offboard.attitude is not None:
@@ -37,6 +47,13 @@ class Following:
         elif offboard.moving and not self._halting and fix.t_s >= guide.trajectory.end_s - _STOP_AHEAD_S:
             self._halting = True
             guide.stop(fix)
+
+    def waits(self) -> Wait | None:
+        """For nothing as long as the targets are foreseen."""
+        foreseen = self._offboard.foreseen
+        if foreseen is None or self._guide.trajectory is not self._ahead:
+            return None
+        return Wait(foreseen.until_s)
 
     def _steer(self, fix: Fix, target: AttitudeTarget) -> None:
         thrust = target.thrust * self._offboard.thrust_full_N

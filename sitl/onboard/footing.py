@@ -2,9 +2,11 @@
 
 from sitl.control.guidance import Effort
 from sitl.onboard import ground
+from sitl.onboard.calm import Ground
 from sitl.onboard.events import EventLog
 from sitl.onboard.guide import Fix, Guide
 from sitl.onboard.modes import EventKind, Landed, Severity
+from sitl.onboard.touch import NEAR_GROUND_M
 
 
 class Footing:
@@ -63,12 +65,26 @@ class Footing:
 
     def watch(self, fix: Fix, intent: ground.Intent) -> bool:
         """With motors running: decide between idling on the ground and flying. True if it has just come to stand."""
-        high = fix.nav.down_m < -ground.NEAR_GROUND_M and not fix.feet_down
+        high = fix.nav.down_m < -NEAR_GROUND_M and not fix.feet_down
         if high and self.landed is Landed.IN_AIR and intent.flying_is is Landed.IN_AIR:
             return False  # nothing that the reference could change
         stood = self.standing
         self._now_in(ground.contact(self._contact, fix, self._guide.reference(fix), intent))
         return self.standing and not stood
+
+    def waits(self, armed: bool, intent: ground.Intent) -> Ground | None:
+        """What of the reference `watch` waits for; None: it may change something at the very next tick."""
+        c = self._contact
+        if self._tilt != ground.Tilt():
+            return None
+        if not armed:
+            return Ground.NOTHING if c.landed is Landed.ON_GROUND else None
+        if not c.standing:
+            settled = c == ground.Contact(Effort.FLY, intent.flying_is) and intent.lifting is None
+            return Ground.RESTING if settled else None
+        if c.down_since_us is None or intent.lifting is not None:
+            return None
+        return Ground.NOTHING if intent.landing else Ground.RISING
 
     def watch_tilt(self, fix: Fix) -> bool:
         """True if the vehicle has just been found lying on the ground."""

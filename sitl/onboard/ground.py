@@ -12,12 +12,10 @@ from sitl.control.reference import Reference
 from sitl.navigation import NavState
 from sitl.onboard.guide import Fix
 from sitl.onboard.modes import Landed
+from sitl.onboard.touch import LIFT_M, LIFT_M_S, NEAR_GROUND_M, TIPPED, TOUCH_M
 
-_LIFT_M, _LIFT_M_S = 0.03, 0.001  # a reference this far above the ground, or rising so fast, means to fly
-_TOUCH_M, _TOUCH_M_S = 0.02, 0.3
+_TOUCH_M_S = 0.3
 _REST_S = 0.4  # a reference that rests on the ground so long, with the vehicle just above it, lets it down
-NEAR_GROUND_M = 0.6
-_TIPPED = -0.5  # nose's down component above which the vehicle is 60° or more from upright
 _TIPPED_S = 0.3
 _TIPPED_M_S = 0.5
 
@@ -56,19 +54,19 @@ def contact(c: Contact, fix: Fix, r: Reference, intent: Intent) -> Contact:
     """The contact now, from the one of the last tick."""
     now_us, nav, feet_down = fix
     if c.standing:
-        rises = r.down_m < nav.down_m - _LIFT_M or r.v_down_m_s < -_LIFT_M_S
+        rises = r.down_m < nav.down_m - LIFT_M or r.v_down_m_s < -LIFT_M_S
         if intent.lifting or (rises and intent.lifting is None and not intent.landing):
             return Contact(Effort.FLY, Landed.TAKING_OFF if intent.taking_off else Landed.IN_AIR)
         return c if c.down_since_us is not None else c._replace(down_since_us=now_us)
     landed = intent.flying_is
     # where the vehicle takes off from is the ground; a reference at or below it means to stand
-    grounded = r.down_m > -_TOUCH_M and r.v_down_m_s > -_LIFT_M_S if intent.lifting is None else not intent.lifting
+    grounded = r.down_m > -TOUCH_M and r.v_down_m_s > -LIFT_M_S if intent.lifting is None else not intent.lifting
     near = nav.down_m >= -NEAR_GROUND_M or feet_down > 0
     calm = abs(nav.v_down_m_s) < _TOUCH_M_S and math.hypot(nav.v_north_m_s, nav.v_east_m_s) < 2.0 * _TOUCH_M_S
     if not (near and grounded and calm):
         return Contact(Effort.FLY, landed)
     since_us = now_us if c.rest_since_us is None else c.rest_since_us
-    resting = (now_us - since_us) * 1e-6 >= _REST_S and nav.down_m > -3.0 * _TOUCH_M
+    resting = (now_us - since_us) * 1e-6 >= _REST_S and nav.down_m > -3.0 * TOUCH_M
     if feet_down > 0 or resting:
         return Contact(Effort.IDLE, Landed.ON_GROUND, now_us)
     return Contact(Effort.FLY, landed, None, since_us)
@@ -84,8 +82,8 @@ class Tilt(NamedTuple):
 def tilt(t: Tilt, now_us: int, nav: NavState, feet_down: int) -> Tilt:
     """The tilt now, from the one of the last tick. It ends only with the vehicle upright on its feet."""
     nose_down = 2.0 * (nav.qx * nav.qz - nav.qw * nav.qy)
-    if nose_down <= _TIPPED or nav.down_m <= -NEAR_GROUND_M:
-        upright = nose_down < _TIPPED and feet_down > 2
+    if nose_down <= TIPPED or nav.down_m <= -NEAR_GROUND_M:
+        upright = nose_down < TIPPED and feet_down > 2
         return Tilt(t.tipped_over and not upright)
     if math.hypot(nav.v_north_m_s, nav.v_east_m_s, nav.v_down_m_s) >= _TIPPED_M_S:
         return Tilt(t.tipped_over)

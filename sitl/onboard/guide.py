@@ -188,8 +188,13 @@ class Guide:
 
     def keep_orbiting(self, fix: Fix, circle: Circle, rate_rad_s: float) -> None:
         """Prolong an orbit without end in time."""
-        if fix.t_s > self.trajectory.end_s - _RENEW_S:
+        if fix.t_s > self.renewal_s:
             self._orbit(fix, circle, rate_rad_s, math.inf, moving=True)
+
+    @property
+    def renewal_s(self) -> float:
+        """When an orbit without end is to be prolonged."""
+        return self.trajectory.end_s - _RENEW_S
 
     def _orbit(self, fix: Fix, circle: Circle, rate_rad_s: float, total_rad: float, moving: bool) -> None:
         r, limits = self.reference(fix), self.limits()

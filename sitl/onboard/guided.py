@@ -9,6 +9,7 @@ from collections.abc import Callable
 from enum import Enum
 from typing import NamedTuple
 
+from sitl.onboard.calm import FOREVER, Wait
 from sitl.onboard.circles import Circle, orbit_speed
 from sitl.onboard.gaze import Gaze, Look
 from sitl.onboard.geofence import Geofence
@@ -115,6 +116,14 @@ class Guided:
             self._next(fix)
         else:
             self._finish()
+
+    def waits(self) -> Wait:
+        """For the end of the present step; for nothing where none is under way."""
+        if not self._steps:
+            return FOREVER
+        if self._rate_rad_s and len(self._steps) == 1:
+            return Wait(self._guide.renewal_s)
+        return Wait(self._guide.done_s if self._until_s is None else self._until_s)
 
     def _finish(self) -> None:
         if self.task is not None:

@@ -7,6 +7,7 @@ breach of a fence that has a point to return to, and without rally points, there
 import math
 from enum import Enum
 
+from sitl.onboard.calm import Wait
 from sitl.onboard.guide import Fix, Guide
 from sitl.onboard.landing import Landing
 from sitl.onboard.parameters import Parameters
@@ -100,3 +101,8 @@ class Homing:
                 self._descend(fix)
             else:
                 self._land(fix)
+
+    def waits(self) -> Wait:
+        if self.stage is Stage.LAND:
+            return self._landing.waits()
+        return Wait(self._until_s if self.stage is Stage.WAIT else self._guide.done_s)

@@ -1,5 +1,6 @@
 """Coming down: descend, slow near the ground, go on until the feet touch."""
 
+from sitl.onboard.calm import FOREVER, Wait
 from sitl.onboard.guide import Fix, Guide
 from sitl.onboard.parameters import Parameters
 
@@ -28,3 +29,7 @@ class Landing:
     def tick(self, fix: Fix) -> None:
         if self._stage == 0 and self._guide.done(fix):
             self._slow(fix)
+
+    def waits(self) -> Wait:
+        """For the slow part, then for the ground alone."""
+        return Wait(self._guide.done_s) if self._stage == 0 else FOREVER

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sitl.control.reference import DEGREE, Trajectory
 from sitl.onboard.modes import ACCEPTED, Outcome, Verdict
@@ -49,6 +50,42 @@ class AttitudeTarget(NamedTuple):
     thrust: float
 
 
+class Foreseen:
+    """Targets known ahead, each of which arrives at the instant that it is stamped with and is followed to the next.
+
+    stamps_us: (n,) ascending, instants at which the onboard logic ticks. position_N, velocity_N, acceleration_N:
+    (n, 3), all finite. heading_rad: of all of them; NaN: they tell none. The first's jerk is taken to be zero.
+    """
+
+    def __init__(
+        self,
+        stamps_us: NDArray[np.int64],
+        position_N: NDArray[np.float64],
+        velocity_N: NDArray[np.float64],
+        acceleration_N: NDArray[np.float64],
+        heading_rad: float,
+    ) -> None:
+        spacing_s = np.diff(stamps_us)[:, np.newaxis] * 1e-6
+        jerk = np.zeros_like(position_N)
+        jerk[1:] = np.clip(np.diff(acceleration_N, axis=0) / spacing_s, -_JERK_MAX, _JERK_MAX)
+        jerk[1:][((spacing_s < _SPACING_S[0]) | (spacing_s > _SPACING_S[1]))[:, 0]] = 0.0
+        c = np.zeros((stamps_us.size, 4, DEGREE + 1))
+        c[:, :3, 0], c[:, :3, 1], c[:, :3, 2], c[:, :3, 3] = position_N, velocity_N, acceleration_N / 2.0, jerk / 6.0
+        self._start_s: NDArray[np.float64] = (stamps_us * 1e-6).astype(np.float64)
+        self._coefficients, self._heading_rad = c, heading_rad
+        self.until_s = float(self._start_s[-1]) + _CARRY_S
+
+    @property
+    def headed(self) -> bool:
+        return not math.isnan(self._heading_rad)
+
+    def trajectory(self, heading_rad: float) -> Trajectory:
+        """What `Offboard.trajectory` makes of each, one after the other. heading_rad: the one in force."""
+        c = self._coefficients.copy()
+        c[:, 3, 0] = self._heading_rad if self.headed else heading_rad
+        return Trajectory(self._start_s, c, self.until_s)
+
+
 class Offboard:
     """The newest target, whether they keep coming, and the trajectory they make.
 
@@ -69,6 +106,7 @@ class Offboard:
         self._arrived_us: int | None = None
         self.target: OffboardTarget | None = None
         self.attitude: AttitudeTarget | None = None
+        self.foreseen: Foreseen | None = None  # followed in place of what arrives
         self.number = 0
         self._stamp_us = 0
         self._stamped = False  # the stamp is the target's own
@@ -146,6 +184,8 @@ class Offboard:
         of one target younger than COM_OF_LOSS_T), and MAVSDK relies on that: it sets the mode right after its first
         target. It is safe: the stream must live on or the same failsafe acts within COM_OF_LOSS_T.
         """
+        if self.foreseen is not None:
+            return now_us * 1e-6 > self.foreseen.until_s
         return self.age_s(now_us) > self._parameters["COM_OF_LOSS_T"]
 
     @property

@@ -27,6 +27,15 @@ class Watch:
     def restart(self) -> None:
         self._battery.restart()
 
+    def battery_lasts(self, remaining: float) -> float:
+        """How full the battery is when there may next be something to tell of it."""
+        return self._battery.lasts(remaining)
+
+    @property
+    def fenced(self) -> bool:
+        """Whether there is a fence to watch at every tick."""
+        return self._geofence.breach.outside or (self._geofence.active and self._geofence.present)
+
     def fence(self, fix: Fix, flying: bool) -> bool:
         """True: the flight is to be terminated."""
         outside = self._geofence.breach.outside

@@ -1,5 +1,6 @@
 import numpy as np
 
+from sitl.calm_array import calm_array
 from sitl.closed_loop import NOISE_COLUMNS, TRACE_COLUMNS, run
 from sitl.control.guidance import Actuation, Guidance, Steering
 from sitl.control.reference import Trajectory
@@ -15,6 +16,7 @@ from sitl.loop_arrays import (
     run_in_place,
     state_of,
 )
+from sitl.tally import NOTHING, tally
 from sitl.vehicle import Vehicle, load_vehicle
 
 
@@ -45,9 +47,10 @@ def test_running_in_place_is_running() -> None:
     traces = [np.zeros((10, len(TRACE_COLUMNS))) for _ in range(2)]
     again, array, seen = np.zeros(LOOP_SIZE), np.zeros(LOOP_SIZE), np.zeros(OBSERVED_SIZE)
     put_loop(array, vehicle.loop)
+    around = calm_array(0.0), tally(), NOTHING
     constants, guidance = (vehicle._plants, vehicle._controllers), vehicle._guidance
     loop, observed = run(*constants, guidance, vehicle.loop, noise, 2_000_000, 2000, 10, traces[0])
-    run_in_place(*constants, guidance_array(guidance), array, noise, 2_000_000, 2000, 10, traces[1], seen)
+    run_in_place(*constants, guidance_array(guidance), array, noise, 2_000_000, 2000, 10, traces[1], seen, *around)
     put_loop(again, loop)
     assert (again == array).all()
     assert observed_of(seen) == observed
