@@ -38,6 +38,7 @@ class Page:
 
     def __init__(self, server: viser.ViserServer, source: Source, live: bool = True) -> None:
         from gcs_tools.view.cameras import Cameras
+        from gcs_tools.view.plots import Plots
         from gcs_tools.view.readouts import Readouts
         from gcs_tools.view.scene import Scene
         from gcs_tools.view.view_tab import ViewTab
@@ -56,7 +57,9 @@ class Page:
         self._offered: tuple[str, ...] = ()
         self.tabs = gui.add_tab_group(order=3.0)
         self.scene = Scene(server)
-        self._parts: list[Any] = [Readouts(self), ViewTab(self), Cameras(self)]
+        readouts = Readouts(self)
+        self.view_tab = self.tabs.add_tab("View")
+        self._parts: list[Any] = [readouts, ViewTab(self), Plots(self), Cameras(self)]
 
     def tick(self, wall_s: float) -> None:
         """Take what the source has, and bring the page up to it."""

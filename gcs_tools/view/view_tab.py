@@ -23,7 +23,7 @@ class ViewTab:
     def __init__(self, page: "Page") -> None:
         gui = page.server.gui
         self._scene = page.scene
-        with page.tabs.add_tab("View"):
+        with page.view_tab:
             self._boxes = {
                 "trail": gui.add_checkbox("flown path", True),
                 "reference": gui.add_checkbox("reference", True),
