@@ -7,16 +7,18 @@ time. So the same seed and settings give the same flight bit for bit, at whateve
 import argparse
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
+import numpy as np
+
+from gcs_tools import metrics, results
 from gcs_tools import plan as plans
-from gcs_tools import results
 from gcs_tools.client import Client, LinkError
 from gcs_tools.flight import Flight
 from gcs_tools.link import now_s, sleep_until
-from gcs_tools.plan import Plan, Uploaded
+from gcs_tools.plan import Plan, Streamed, Uploaded
 from gcs_tools.progress import Progress
 from sitl.geodesy import GeoPoint
 from sitl.mavlink.endpoint import Endpoint, PortKind
@@ -30,6 +32,20 @@ LIMIT_S = 7200.0  # of simulation time: no flight takes so long, so one that doe
 _SHOW_EVERY = 64  # turns
 
 AnyVehicle = TypeVar("AnyVehicle", bound=Vehicle)
+
+
+class _Watched(Vehicle):
+    """A vehicle of whose true motion a record is kept: time [s], position and its own reference (north, east, down)."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        self.motion: list[tuple[float, ...]] = []
+        super().__init__(*args, **options)
+
+    def advance(self, until_us: int, trace: Any = None) -> None:
+        super().advance(until_us, trace)
+        seen = self.snapshot()
+        s = seen.truth
+        self.motion.append((seen.now_us * 1e-6, s.north_m, s.east_m, s.down_m, *seen.reference[:3]))
 
 
 class Flown(NamedTuple):
@@ -87,6 +103,27 @@ def build(
     return kind(flown, home=home, believed_airframe=airframe, **options)
 
 
+def true_figures(flight: Flight, motion: Sequence[tuple[float, ...]]) -> dict[str, Any]:
+    """Errors of the plant's own position, which the vehicle itself doesn't know, as JSON has them."""
+    assert flight.t0_s is not None
+    assert flight.measured_s is not None
+    rows = np.array(motion)
+    t = rows[:, 0] - flight.t0_s
+    rows, t = rows[t > -1e-6], t[t > -1e-6]
+    wanted = rows[:, 4:7]
+    if isinstance(flight.plan, Streamed):
+        wanted = np.array([flight.plan.reference.at(float(s)).position_m for s in t])
+    none = np.zeros((0, 4))
+    track = metrics.Track(t, wanted, rows[:, 1:4], none, none, none)
+    m = metrics.evaluate(track, flight.measured_s)
+    mean, greatest = metrics.distance(track, flight.measured_s)
+    figures = {"mae": m.mae, "rmse": m.rmse, "max_overshoot": m.max_overshoot, "final_error": m.final_error}
+    in_space = {"mean_distance": mean, "max_distance": greatest}
+    return {k: [round(v, 6) for v in values] for k, values in figures.items()} | {
+        k: round(v, 6) for k, v in in_space.items()
+    }
+
+
 def main(args: argparse.Namespace) -> int:
     """`sitl fly` with its parsed arguments; a speed of 0 is as fast as possible.
 
@@ -97,12 +134,13 @@ def main(args: argparse.Namespace) -> int:
         vehicle = build(
             plan,
             load_vehicle(args.vehicle),
-            Vehicle,
+            _Watched,
             plant=dict(args.plant),
             believed=dict(args.believed),
             seed=args.seed,
             wind_N=args.wind,
             gust_m_s=args.gust,
+            heading_rad=math.radians(args.heading),
             overrides={**(gains_named(args.gains) if args.gains else {}), **dict(args.set)},
         )
         out = Path(args.out) if args.out else None
@@ -113,7 +151,9 @@ def main(args: argparse.Namespace) -> int:
     flight = flown.flight
     if flight.measured_s is not None:
         try:
-            results.conclude(flight, vehicle=vehicle.spec.name, factor=flown.factor, out=out, as_json=args.json)
+            true = true_figures(flight, vehicle.motion)
+            factor, name = flown.factor, vehicle.spec.name
+            results.conclude(flight, vehicle=name, factor=factor, out=out, as_json=args.json, true=true)
         except LinkError as error:
             return _complain(f"{plan.name}: {error}", 1)
         except OSError as error:

@@ -124,6 +124,13 @@ def _range(track: Track, duration_s: float, series: Array, columns: tuple[int, .
     return [float(chosen.min()), float(chosen.max())] if chosen.size else None
 
 
+def distance(track: Track, duration_s: float) -> tuple[float, float]:
+    """(mean, greatest) distance from the reference in space over 0 ≤ t ≤ duration_s [m]."""
+    t, error = _window(track.t_s, track.position_m - track.reference_m, duration_s)
+    away = np.sqrt(np.sum(error**2, axis=1, keepdims=True))
+    return float(_integral(away, t)[0] / duration_s), float(away.max())
+
+
 def report(mission: str, vehicle: str | None, duration_s: float, m: Metrics, real_time_factor: float) -> dict[str, Any]:
     """The one JSON object that a measured flight comes to."""
     return {

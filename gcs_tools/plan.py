@@ -125,6 +125,8 @@ def _neighbours(path: Path) -> str:
     return f" (in {folder}: {', '.join(names)})" if names else ""
 
 
+RANDOM = "random:"
+
 # by ending; a .txt is what older ground stations call a .waypoints
 READERS = {
     ".yaml": "gcs_tools.yaml_plan",
@@ -146,8 +148,12 @@ def format_of(path: str | Path) -> Any:
 def load(path: str | Path) -> Plan:
     """The flight in a mission file: YAML as docs/missions.md says, a QGroundControl .plan, or QGC WPL 110 text.
 
-    Raises ConfigError whose message names the file, the line, the field and what is allowed there.
+    `random:SEED` is no file but a flight made up from that seed. Raises ConfigError whose message names the file, the
+    line, the field and what is allowed there.
     """
+    if str(path).startswith(RANDOM):
+        made: Plan = import_module("gcs_tools.random_plan").parse(str(path))
+        return made
     text = read_text(path)
     plan: Plan = format_of(path).loads(text, str(path))
     return plan

@@ -71,6 +71,54 @@ class Waypoints:
         return Setpoint((x0 + dx * s, y0 + dy * s, z0 + dz * s), (dx * v, dy * v, dz * v), (dx * a, dy * a, dz * a))
 
 
+class Knot(NamedTuple):
+    t_s: float
+    at_m: Vector
+    velocity_m_s: Vector
+
+
+class Spline:
+    """Through every knot at its time with its velocity and without acceleration; quintic polynomials between.
+
+    Position, velocity and acceleration are continuous.
+    """
+
+    def __init__(self, knots: Sequence[Knot]) -> None:
+        self.knots = tuple(knots)
+        self._times = [knot.t_s for knot in self.knots]
+
+    def at(self, t_s: float) -> Setpoint:
+        after = bisect_right(self._times, t_s)
+        if after == 0:
+            return Setpoint(self.knots[0].at_m, ZERO, ZERO)
+        if after == len(self.knots):
+            return Setpoint(self.knots[-1].at_m, ZERO, ZERO)
+        (t0, p0, v0), (t1, p1, v1) = self.knots[after - 1], self.knots[after]
+        span = t1 - t0
+        tau = (t_s - t0) / span
+        s, ds, dds = minimum_jerk(tau)
+        # Hermite's quintics for the two velocities, where both accelerations are zero
+        f, g = _departure(tau), _departure(1.0 - tau)
+        rows = []
+        for a, b, u, w in zip(p0, p1, v0, v1, strict=True):
+            rows.append((
+                a + (b - a) * s + span * (u * f[0] - w * g[0]),
+                (b - a) * ds / span + u * f[1] + w * g[1],
+                (b - a) * dds / span**2 + (u * f[2] - w * g[2]) / span,
+            ))  # fmt: skip
+        position, velocity, acceleration = zip(*rows, strict=True)
+        return Setpoint(position, velocity, acceleration)
+
+
+def _departure(tau: float) -> tuple[float, float, float]:
+    """τ − 6τ³ + 8τ⁴ − 3τ⁵, which leaves with slope 1 and arrives at rest in zero, with its first two derivatives."""
+    return (
+        tau + tau**3 * (-6.0 + tau * (8.0 - 3.0 * tau)),
+        1.0 + tau**2 * (-18.0 + tau * (32.0 - 15.0 * tau)),
+        tau * (-36.0 + tau * (96.0 - 60.0 * tau)),
+    )
+
+
 class Circle:
     """A climb straight up from the start, then level laps of a circle that passes through the point above the start.
 

@@ -47,11 +47,24 @@ def prepare(out: Path | None) -> None:
         raise ConfigError(f"{out}: can't be written to")
 
 
-def conclude(flight: Flight, *, vehicle: str | None, factor: float, out: Path | None, as_json: bool) -> None:
-    """Measure a flown flight and tell the result; `out` is a folder that `prepare` has made."""
+def conclude(
+    flight: Flight,
+    *,
+    vehicle: str | None,
+    factor: float,
+    out: Path | None,
+    as_json: bool,
+    true: dict[str, Any] | None = None,
+) -> None:
+    """Measure a flown flight and tell the result; `out` is a folder that `prepare` has made.
+
+    true: figures of the true position, where they are known.
+    """
     metrics = flight.metrics()
     assert flight.measured_s is not None
     result = report(flight.plan.name, vehicle, flight.measured_s, metrics, factor)
+    if true is not None:
+        result["true"] = true
     if metrics.largest_gap_s > GAP_S:
         print(f"warning: {metrics.largest_gap_s:.1f} s of the flight went without a sample", file=sys.stderr)
     if out is not None:

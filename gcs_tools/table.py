@@ -58,6 +58,8 @@ def show(result: dict[str, Any], paper: str | None, console: Console | None = No
     console.print(table)
     if result["waypoints"]:
         console.print(_waypoints(result["waypoints"]))
+    if "true" in result:
+        console.print(_true(result["true"]), highlight=False)
     console.print(_ranges(result["ranges"]), f"{result['real_time_factor']:g} × real time", sep="\n", highlight=False)
 
 
@@ -79,6 +81,14 @@ def _waypoints(waypoints: list[dict[str, Any]]) -> Table:
         target = ", ".join(f"{round(v, 2) + 0.0:.2f}" for v in w["target"])
         table.add_row(f"{w['t_s']:.1f}", f"({target})", *(f"{e:+.4f}" for e in w["error"]))
     return table
+
+
+def _true(true: dict[str, Any]) -> str:
+    """One line: the errors that the vehicle itself doesn't know of."""
+    mae = " / ".join(f"{v:.4f}" for v in true["mae"])
+    return (
+        f"true position: MAE {mae} m; in space {true['mean_distance']:.4f} m, {true['max_distance']:.4f} m at its worst"
+    )
 
 
 def _ranges(ranges: dict[str, list[float] | None]) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NoReturn, TypeVar
 
+from sitl.campaign import options
 from sitl.daemon import config
 
 T = TypeVar("T")
@@ -289,6 +290,13 @@ def _parser() -> argparse.ArgumentParser:
             metavar="NAME=VALUE",
             help=f"change an airframe number of {whose}; may be given again",
         )
+    fly.add_argument(
+        "--heading",
+        type=_reader(config.parse_heading),
+        default=0.0,
+        metavar="DEG",
+        help="where the belly faces at the start, degrees from north towards east (0)",
+    )
     fly.add_argument("--out", type=Path, metavar="DIR", help="write the flight's logs and figures here")
     fly.add_argument("--json", action="store_true", help="print one JSON object")
 
@@ -305,6 +313,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     reproduce.add_argument("--quick", action="store_true", help="one seed, ablations with the default vehicle only")
     reproduce.add_argument("--json", action="store_true", help="print all numbers as one JSON object")
+
+    options.add(command)
     return parser
 
 
@@ -355,6 +365,12 @@ def _reproduce(args: argparse.Namespace) -> int:
     return reproduction.main(args)
 
 
+def _campaign(args: argparse.Namespace) -> int:
+    from sitl.campaign import main as campaigns
+
+    return campaigns.main(args)
+
+
 def _is_mistake(error: ValueError) -> bool:
     """Whether the person at the keyboard can mend it; files that can't be used say so with a ConfigError."""
     from sitl.strict_yaml import ConfigError
@@ -364,7 +380,7 @@ def _is_mistake(error: ValueError) -> bool:
 
 def main(argv: Sequence[str] | None = None) -> int:
     args = _parser().parse_args(argv)
-    commands = {"run": _run, "fly": _fly, "trim": _trim, "reproduce": _reproduce}
+    commands = {"run": _run, "fly": _fly, "trim": _trim, "reproduce": _reproduce, "campaign": _campaign}
     try:
         return commands[args.command](args)
     except ValueError as error:

@@ -128,6 +128,11 @@ def parse_home(text: str) -> Home:
     return Home(GeoPoint(lat, lon, alt), math.radians(heading))
 
 
+def parse_heading(text: str) -> float:
+    (heading,) = _numbers(text, "DEG")
+    return _within(heading, -360.0, 360.0, "heading")
+
+
 def parse_wind(text: str) -> tuple[float, float, float]:
     north, east, down = (
         _within(v, -WIND_MAX_M_S, WIND_MAX_M_S, "wind component") for v in _numbers(text, "NORTH,EAST,DOWN")

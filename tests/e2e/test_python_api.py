@@ -26,7 +26,14 @@ def test_it_is_the_flight_that_the_command_line_flies(hover: Flown) -> None:
     arguments = "--vehicle yawsitter-real --seed 4 --wind 1,0,0 --gust 0.3 --set POS_X_P=2.0 --json"
     command = [sys.executable, "-m", "sitl", "fly", str(HOVER), *arguments.split()]
     printed = json.loads(subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT).stdout)
+    true = printed.pop("true")
     assert {**hover.reported, "real_time_factor": 0} == {**printed, "real_time_factor": 0}
+    assert {name: hover.true[name] for name in ("mae", "rmse", "max_overshoot", "final_error")} == {
+        name: values for name, values in true.items() if "distance" not in name
+    }
+    away = np.linalg.norm(hover.position_m - hover.reference_m, axis=1)
+    assert true["max_distance"] == pytest.approx(away.max(), abs=1e-6)
+    assert true["mean_distance"] == pytest.approx(away.mean(), rel=0.01)
 
 
 def test_its_arrays_have_a_row_for_every_sample_and_say_what_happened(hover: Flown) -> None:

@@ -81,6 +81,7 @@ def test_its_commands_fly_the_very_same_flights(report: Report, name: str) -> No
     done = sitl(*words, "--json", folder=report.folder)
     assert done.returncode == 0, done.stderr
     again = json.loads(done.stdout)
+    assert again.pop("true")["mae"] == flight["true"]["mae"]
     for result in (again, flight["reported"]):
         del result["real_time_factor"]  # the machine's, not the flight's
     assert again == flight["reported"]
