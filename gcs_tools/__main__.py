@@ -21,6 +21,7 @@ examples:
   gcs fly missions/rectangle.yaml
   gcs takeoff --height 3 --wait && gcs land --wait
   gcs param set RATE_Y_P 0.4
+  gcs tune step position.x --gains paper --against tuned
   gcs watch --signing-key flight.key                    a vehicle that was started with the same key
   gcs param list --impair loss=0.2,dup=0.05,jitter=0.1  over a bad link
   gcs COMMAND --help explains each
@@ -205,6 +206,10 @@ def parser() -> argparse.ArgumentParser:
     )
     get.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="where to (here)")
     add(actions, "erase", "erase all of the vehicle's logs", "  gcs log erase")
+
+    from gcs_tools.tune import command as tune
+
+    tune.add(commands, link, _Parser)
 
     for name, short in (("arm", "arm the motors"), ("disarm", "disarm the motors")):
         force = add(commands, name, short, f"  gcs {name}")

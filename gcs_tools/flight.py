@@ -41,7 +41,7 @@ _IGNORE_YAW, _IGNORE_YAW_RATE = 1 << 10, 1 << 11
 # while it lasts, so that a flight at many times real time isn't spent on packing them.
 _WANTED = {"LOCAL_POSITION_NED": 20_000, "DEBUG_VECT": 100_000, "SYS_STATUS": 500_000, "SYSTEM_TIME": 1_000_000}
 _WANTED_UPLOADED = {"POSITION_TARGET_LOCAL_NED": 20_000, "MISSION_CURRENT": 1_000_000, "HOME_POSITION": 2_000_000}
-_UNWANTED = (
+UNWANTED = (
     "ATTITUDE",
     "ATTITUDE_QUATERNION",
     "HIGHRES_IMU",
@@ -142,7 +142,7 @@ class Flight:
         yield from client.connect()
         self._note(f"vehicle {client.system} heard")
         self.phase = "configuring"
-        intervals = dict.fromkeys(_UNWANTED, -1) | self._wanted
+        intervals = dict.fromkeys(UNWANTED, -1) | self._wanted
         yield from self._listen(intervals)
         if v.armed:
             raise LinkError("the vehicle is armed already; a flight starts disarmed and standing")

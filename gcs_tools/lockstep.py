@@ -54,6 +54,23 @@ class Flown(NamedTuple):
     factor: float  # simulation time over wall time, from the first turn to the last
 
 
+class Lockstep:
+    """The link to a vehicle in this process: both sides take turns, and simulation time is what both take for time."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        self.vehicle, self._endpoint = vehicle, Endpoint(vehicle)
+
+    def turn(self, client: Client, turn_us: int = TURN_US) -> None:
+        """The client speaks, the vehicle answers and flies on for `turn_us`."""
+        vehicle, endpoint = self.vehicle, self._endpoint
+        wall_s = vehicle.now_us * 1e-6
+        for datagram in client.poll(wall_s):
+            endpoint.receive(datagram, ADDRESS, PortKind.ONBOARD, wall_s)
+        for sent in endpoint.poll(wall_s):
+            client.receive(sent.data, wall_s)
+        vehicle.advance(vehicle.now_us + turn_us)
+
+
 def fly(
     plan: Plan, vehicle: Vehicle, *, speed: float = math.inf, quiet: bool = True, limit_s: float = LIMIT_S
 ) -> Flown:
@@ -61,7 +78,7 @@ def fly(
 
     The flight's own failure is in Flown.flight.client.fault.
     """
-    endpoint, client = Endpoint(vehicle), Client()
+    link, client = Lockstep(vehicle), Client()
     flight = Flight(plan, client)
     vehicle.advance(TURN_US)  # kernels compiled and caches warm before the clock starts
     start_us, start_s = vehicle.now_us, now_s()
@@ -69,12 +86,7 @@ def fly(
     turns = 0
     with Progress(flight, quiet=quiet) as progress:
         while not client.finished and vehicle.now_us < end_us:
-            wall_s = vehicle.now_us * 1e-6
-            for datagram in client.poll(wall_s):
-                endpoint.receive(datagram, ADDRESS, PortKind.ONBOARD, wall_s)
-            for sent in endpoint.poll(wall_s):
-                client.receive(sent.data, wall_s)
-            vehicle.advance(vehicle.now_us + TURN_US)
+            link.turn(client)
             turns += 1
             if turns % _SHOW_EVERY == 0:
                 progress.update(now_s())

@@ -68,9 +68,9 @@ def _beside(flown: float, printed: float) -> list[str]:
     return [f"{printed:.4f}", f"{flown:.4f}", f"[{'green' if ratio <= 1.0 else 'yellow'}]{ratio:.2f}×[/]"]
 
 
-def plain(title: str) -> Table:
+def plain(title: str | None) -> Table:
     """A table in the style of all of them."""
-    return Table(title=escape(title), title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 0))
+    return Table(title=title and escape(title), title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 0))
 
 
 def _waypoints(waypoints: list[dict[str, Any]]) -> Table:

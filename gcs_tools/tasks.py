@@ -150,6 +150,12 @@ def _log_erase(args: argparse.Namespace) -> None:
     print(f"{_converse(args, _after_connecting(logs.erase))} log files erased")
 
 
+def _tune(args: argparse.Namespace) -> None:
+    from gcs_tools.tune import command
+
+    command.run(args)
+
+
 def _watch(args: argparse.Namespace) -> None:
     from gcs_tools.watch import Watch, until
 
@@ -185,6 +191,7 @@ _TASKS: dict[str, Callable[[argparse.Namespace], None]] = {
     "log": _log,
     "watch": _watch,
     "view": _view,
+    "tune": _tune,
     "arm": _say(lambda args, client: commands.arm(client, force=args.force)),
     "disarm": _say(lambda args, client: commands.disarm(client, force=args.force)),
     "takeoff": _say(lambda args, client: commands.takeoff(client, height_m=args.height, wait=args.wait)),

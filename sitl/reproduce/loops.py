@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from sitl.control.disturbance import Bandwidth
 from sitl.control.gains import Gains, from_names
+from sitl.margins import Margins, margins, response
 from sitl.model.derivative import Actuators
 from sitl.reproduce.linear import READINGS, Design, Hover, Linear, hover, linearised, read_as, taking_part
-from sitl.reproduce.margins import Margins, margins, response
 from sitl.vehicle import Vehicle, load_vehicle
 
 Array = NDArray[np.float64]

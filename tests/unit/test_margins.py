@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from sitl.reproduce.margins import margins, response
+from sitl.margins import margins, response
 
 W = np.geomspace(1e-3, 1e4, 20_000)
 
