@@ -227,14 +227,15 @@ def parser() -> argparse.ArgumentParser:
 
     view = commands.add_parser(
         "view",
-        help="show vehicles on a web page",
-        description="Serve a web page on which vehicles are seen flying, fed by their Zenoh telemetry. Until Ctrl-C.\n"
-        "Needs pip install 'yawsitter-sitl[view]'.",
+        help="show vehicles and recorded flights on a web page",
+        description="Serve a web page on which vehicles are seen flying, fed by their Zenoh telemetry, or a recorded\n"
+        "flight (.mcap of `sitl run --record`) is played back. Until Ctrl-C. Needs pip install 'yawsitter-sitl[view]'.",
         epilog="examples:\n  gcs view\n  gcs view --instance 0 --instance 1\n"
-        "  gcs view --connect tcp/127.0.0.1:7450 --port 8081",
+        "  gcs view --connect tcp/127.0.0.1:7450 --port 8081\n  gcs view logs/flight.mcap",
         formatter_class=_Raw,
         allow_abbrev=False,
     )
+    view.add_argument("file", type=Path, nargs="?", metavar="FILE.mcap", help="play this recording back")
     view.add_argument(
         "--connect",
         action="append",

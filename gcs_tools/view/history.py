@@ -84,11 +84,23 @@ class History:
         """(n, WIDTH), n ≤ ROWS: a view that the next `add` may change."""
         return self._table[max(0, self._end - self._rows) : self._end]
 
-    def last(self, seconds: float, until_s: float | None = None) -> NDArray[np.float64]:
-        """The rows of a window that ends at `until_s` (the newest)."""
+    def last(self, seconds: float) -> NDArray[np.float64]:
+        """The rows of the newest so many seconds."""
         table = self.table()
         if not len(table):
             return table
-        end_s = table[-1, 0] if until_s is None else until_s
-        first, last = np.searchsorted(table[:, 0], (end_s - seconds, end_s), side="right")
-        return table[first:last]
+        return table[np.searchsorted(table[:, 0], table[-1, 0] - seconds, side="right") :]
+
+
+class Recorded(History):
+    """All rows of a recording, (n, WIDTH), shown up to one of them."""
+
+    def __init__(self, table: NDArray[np.float64]) -> None:
+        super().__init__(rows=0)
+        self._table = table
+
+    def show(self, rows: int) -> None:
+        self._end = self.added = rows
+
+    def table(self) -> NDArray[np.float64]:
+        return self._table[: self._end]

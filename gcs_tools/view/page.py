@@ -17,6 +17,7 @@ from typing import Any, Protocol
 import viser
 
 from gcs_tools.view.feed import Status
+from gcs_tools.view.replay import Replay
 from gcs_tools.view.vehicle import Vehicle
 
 BRAND_RGB = (37, 99, 170)
@@ -36,14 +37,16 @@ class Source(Protocol):
 class Page:
     CAMERA_ORDER = 2.0  # of each browser's own row of buttons, between the choice of vehicle and the tabs
 
-    def __init__(self, server: viser.ViserServer, source: Source, live: bool = True) -> None:
+    def __init__(self, server: viser.ViserServer, source: Source) -> None:
         from gcs_tools.view.cameras import Cameras
         from gcs_tools.view.plots import Plots
         from gcs_tools.view.readouts import Readouts
+        from gcs_tools.view.replay_bar import ReplayBar
         from gcs_tools.view.scene import Scene
         from gcs_tools.view.view_tab import ViewTab
 
-        self.server, self.source, self.live = server, source, live
+        self.server, self.source = server, source
+        self.live = not isinstance(source, Replay)
         self.each_tick: list[Callable[[float], None]] = []
         self.selected: Vehicle | None = None
         self.wall_s = 0.0  # of the tick under way, or the last
@@ -60,6 +63,8 @@ class Page:
         readouts = Readouts(self)
         self.view_tab = self.tabs.add_tab("View")
         self._parts: list[Any] = [readouts, ViewTab(self), Plots(self), Cameras(self)]
+        if isinstance(source, Replay):
+            self._parts.append(ReplayBar(self, source))
 
     def tick(self, wall_s: float) -> None:
         """Take what the source has, and bring the page up to it."""

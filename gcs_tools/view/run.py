@@ -8,6 +8,7 @@ import logging
 import socket
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from sitl.strict_yaml import ConfigError
@@ -21,7 +22,7 @@ def run(args: argparse.Namespace) -> None:
     from gcs_tools.view.page import Page
 
     with contextlib.ExitStack() as stack:
-        source = _live(args)
+        source = _recording(args.file) if args.file is not None else _live(args)
         stack.callback(source.close)
         server = open_server(args.host, args.port)
         stack.callback(server.stop)
@@ -52,6 +53,13 @@ def _live(args: argparse.Namespace) -> Any:
         return Feed(args.connect or [endpoint_of(k) for k in instances], args.instance or [])
     except FeedError as error:
         raise ConfigError(f"--connect: {error}") from None
+
+
+def _recording(path: Path) -> Any:
+    from gcs_tools.view.replay import Replay
+
+    _need("mcap")
+    return Replay.load(path)
 
 
 def open_server(host: str, port: int) -> Any:

@@ -97,12 +97,3 @@ def test_the_history_keeps_the_newest_rows_in_order() -> None:
     table = vehicle.history.table()
     assert table[:, INDEX["north_m"]].tolist() == [float(k) for k in range(86, 96)]
     assert vehicle.history.last(0.1)[:, INDEX["t_s"]] == pytest.approx([1.82, 1.84, 1.86, 1.88, 1.9])
-
-
-def test_the_last_seconds_end_where_they_are_asked_to() -> None:
-    vehicle = Vehicle(0)
-    for k in range(100):
-        sample(vehicle, k * 20_000)
-    window = vehicle.history.last(0.5, until_s=1.0)[:, INDEX["t_s"]]
-    assert window[0] > 0.5
-    assert window[-1] == pytest.approx(1.0)

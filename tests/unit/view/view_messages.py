@@ -25,7 +25,8 @@ SAMPLED = {"state": STATE, "attitude": ATTITUDE, "setpoint": SETPOINT, "actuator
 MODE = {
     "mode": "hold", "armed": True, "landed": "in air", "tipped_over": False, "failsafe": "", "ready_to_arm": True,
     "mission_state": "no mission", "mission_current": 0, "mission_total": 0, "mission_plan_id": 0,
-    "home_N_m": [0.0, 0.0, 0.0], "home_heading_deg": 0.0, "speed_factor": 1.0, "paused": False,
+    "home_N_m": [0.0, 0.0, 0.0], "home_heading_deg": 0.0, "origin_lat_deg": 55.7, "origin_lon_deg": 37.4,
+    "origin_alt_amsl_m": 190.0, "speed_factor": 1.0, "paused": False,
     "battery_voltage_V": 12.5, "battery_current_A": 20.0, "battery_remaining": 0.9,
 }  # fmt: skip
 
