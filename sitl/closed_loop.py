@@ -17,7 +17,7 @@ from sitl.estimation.corrections import with_baro, with_field, with_gnss
 from sitl.estimation.error_state import Estimate, Tuning, copied, nav_of, predicted, spread
 from sitl.frames import GRAVITY_M_S2
 from sitl.jit import kernel
-from sitl.model.airframe import Airframe, Gear
+from sitl.model.airframe import Airframe, Gear, loaded
 from sitl.model.derivative import ActuatorCommand, Actuators, Loads, loads, total
 from sitl.model.failures import SOUND, Failures, followed, heard, misplaced_m
 from sitl.model.integrate import step
@@ -267,6 +267,7 @@ def run_on(
 ) -> tuple[LoopState, Observed]:
     """`run`, but the covariance is `loop`'s own, changed in place."""
     plant, controller = plants[0], controllers[0]
+    airframe, believed = loaded(plant.airframe), loaded(controller.airframe)
     s, gusts, errors, memory = loop.state, loop.gusts, loop.sensors, loop.memory
     estimating, noisy = controller.estimating > 0.0, noise.shape[0] > 0
     gusty = noisy and plant.wind.gust_m_s > 0.0
@@ -291,14 +292,14 @@ def run_on(
             command = standing_command(nav, 0.0)
             reference = sample(guidance.trajectory, t_s)
         elif guidance.effort == _IDLE:
-            command = standing_command(nav, plant.airframe.thrust_min_N)
+            command = standing_command(nav, airframe.thrust_min_N)
             reference = sample(guidance.trajectory, t_s)
         elif guidance.effort == _DIRECT:
-            command = direct_command(plant.airframe, nav, guidance.actuation)
+            command = direct_command(airframe, nav, guidance.actuation)
             reference = sample(guidance.trajectory, t_s)
         else:
             command, memory, reference = cascade(
-                controller.airframe, controller.gains, controller.settings, guidance, memory, nav, t_s, dt_s
+                believed, controller.gains, controller.settings, guidance, memory, nav, t_s, dt_s
             )
         actuators = ActuatorCommand(
             command.thrust_left_N, command.thrust_right_N, command.flap_left_rad, command.flap_right_rad
@@ -306,8 +307,8 @@ def run_on(
         if trace.shape[0] > 0:
             _trace(plant, s, command, reference, nav, wind_N, t_s, trace[k])
         for _ in range(plant.substeps):
-            driven = followed(plant.failures, plant.airframe, s, actuators)
-            s = step(plant.airframe, plant.gear, plant.actuators, s, driven, wind_N, h_s)
+            driven = followed(plant.failures, airframe, s, actuators)
+            s = step(airframe, plant.gear, plant.actuators, s, driven, wind_N, h_s)
         if estimating or noisy:
             felt = (0.0, 0.0, 0.0)
             if estimating:
@@ -319,7 +320,7 @@ def run_on(
                 now_us = start_us + (k + 1) * dt_us
                 estimate = _navigated(estimate, controller.tuning, plant, errors, s, n, off, now_us, dt_us)
     if guidance.effort != _FLY and steps > 0:
-        memory = at_rest(controller.airframe, controller.airframe.thrust_min_N)
+        memory = at_rest(believed, believed.thrust_min_N)
     acting, specific_force, linear = _motion(plant, s, wind_N)
     observed = Observed(
         nav_of(estimate) if estimating else observe(plant.sensors, errors, s),

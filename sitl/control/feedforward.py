@@ -90,15 +90,11 @@ def heading_frame(heading_rad: float, x: float, y: float, z: float) -> Vec3:
 
 
 @kernel
-def _reference_trim(a: Airframe, r: Reference, start: Trim, fresh_slope: bool) -> Trim:
-    """The trim that the reference's own velocity and acceleration need.
-
-    Two passes: the second difference of three such trims is taken, which would show what one pass leaves over.
-    """
+def _needed(a: Airframe, r: Reference) -> tuple[Vec3, Vec3]:
+    """(force [N], air velocity [m/s]) in the heading frame of a flight that follows the reference exactly."""
     m = a.mass_kg
     force = heading_frame(r.heading_rad, m * r.a_north_m_s2, m * r.a_east_m_s2, m * (r.a_down_m_s2 - GRAVITY_M_S2))
-    air = heading_frame(r.heading_rad, r.v_north_m_s, r.v_east_m_s, r.v_down_m_s)
-    return refined(a, force, air, 0.0, refined(a, force, air, 0.0, start, fresh_slope), False)
+    return force, heading_frame(r.heading_rad, r.v_north_m_s, r.v_east_m_s, r.v_down_m_s)
 
 
 @kernel
@@ -125,11 +121,17 @@ def reference_needs(a: Airframe, r: Reference, start: Trim, ahead: bool) -> tupl
     Rates and moment are those of its trim's attitude, from its trim now, a moment ago and a moment on.
     """
     zero = (0.0, 0.0, 0.0)
-    now = _reference_trim(a, r, start, True)
+    force, air = _needed(a, r)
+    now = refined(a, force, air, 0.0, refined(a, force, air, 0.0, start, True), False)
     if not ahead:
         return now, zero, zero
-    before = _reference_trim(a, _carried(r, -_LOOK_S), now, False)
-    after = _reference_trim(a, _carried(r, _LOOK_S), now, False)
+    # pass by pass, so that a processor can work on both at once
+    force_before, air_before = _needed(a, _carried(r, -_LOOK_S))
+    force_after, air_after = _needed(a, _carried(r, _LOOK_S))
+    before = refined(a, force_before, air_before, 0.0, now, False)
+    after = refined(a, force_after, air_after, 0.0, now, False)
+    before = refined(a, force_before, air_before, 0.0, before, False)
+    after = refined(a, force_after, air_after, 0.0, after, False)
     pitch_rate = (after.pitch_rad - before.pitch_rad) / (2.0 * _LOOK_S)
     lean_rate = (after.lean_rad - before.lean_rad) / (2.0 * _LOOK_S)
     pitching = (after.pitch_rad - 2.0 * now.pitch_rad + before.pitch_rad) / (_LOOK_S * _LOOK_S)

@@ -13,12 +13,13 @@ Coefficients = tuple[float, float, float]
 def separated(a: Airframe, alpha: float) -> float:
     """How far the flow has left the wing: 0 attached, 1 separated; ½ at ±α₀.
 
-    σ(α) = (1 + e^{−M(α−α₀)} + e^{M(α+α₀)}) / ((1 + e^{−M(α−α₀)}) (1 + e^{M(α+α₀)}))   (Beard & McLain, Eq. 4.10)
+    σ(α) = (1 + e^{−M(α−α₀)} + e^{M(α+α₀)}) / ((1 + e^{−M(α−α₀)}) (1 + e^{M(α+α₀)}))   (Beard & McLain, Eq. 4.10),
+    which is 1 − n / ((1 + n) (1 + f)) with n = e^{M(α₀−|α|)} and f = e^{−M(α₀+|α|)} = n e^{−2Mα₀}: one exponential.
     """
-    # beyond ±35 the exponentials no longer change the sum of ones in double precision
-    above = math.exp(-max(-35.0, min(35.0, a.stall_sharpness * (alpha - a.stall_angle_rad))))
-    below = math.exp(max(-35.0, min(35.0, a.stall_sharpness * (alpha + a.stall_angle_rad))))
-    return (1.0 + above + below) / ((1.0 + above) * (1.0 + below))
+    # beyond 35 the exponential no longer changes the sum with one in double precision
+    near = math.exp(min(35.0, a.stall_sharpness * (a.stall_angle_rad - abs(alpha))))
+    far = near * math.exp(-2.0 * a.stall_sharpness * a.stall_angle_rad)
+    return 1.0 - near / ((1.0 + near) * (1.0 + far))
 
 
 @kernel
@@ -32,9 +33,9 @@ def coefficients(a: Airframe, alpha: float, cos_alpha: float, sin_alpha: float) 
     s = separated(a, alpha)
     attached_lift = a.lift_at_zero + a.lift_slope * alpha
     aspect_ratio = a.wing_span_m * a.wing_span_m / a.wing_area_m2
-    attached_drag = a.drag_at_zero + attached_lift * attached_lift / (math.pi * a.oswald * aspect_ratio)
+    attached_drag = a.drag_at_zero + attached_lift * attached_lift * (1.0 / (math.pi * a.oswald * aspect_ratio))
     normal = a.plate_drag * sin_alpha
-    plate_moment = -0.5 * abs(alpha) / math.pi * normal
+    plate_moment = -0.5 / math.pi * abs(alpha) * normal
     return (
         (1.0 - s) * attached_lift + s * normal * cos_alpha,
         (1.0 - s) * attached_drag + s * (a.drag_at_zero + normal * sin_alpha),
@@ -52,7 +53,8 @@ def panel(a: Airframe, u_m_s: float, w_m_s: float, fraction: float) -> Vec3:
     speed = math.sqrt(u_m_s * u_m_s + w_m_s * w_m_s)
     if speed < 1e-6:
         return 0.0, 0.0, 0.0
-    cos_alpha, sin_alpha = u_m_s / speed, w_m_s / speed
+    k = 1.0 / speed
+    cos_alpha, sin_alpha = k * u_m_s, k * w_m_s
     lift, drag, moment = coefficients(a, math.atan2(w_m_s, u_m_s), cos_alpha, sin_alpha)
     q = 0.5 * a.air_density_kg_m3 * speed * speed * fraction
     fx = q * a.wing_area_m2 * (lift * sin_alpha - drag * cos_alpha)

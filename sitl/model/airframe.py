@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from sitl import strict_yaml
 from sitl.frames import GRAVITY_M_S2
+from sitl.jit import kernel
 from sitl.quantities import Entry, check_names, refusal
 from sitl.strict_yaml import ConfigError
 
@@ -63,6 +64,22 @@ class Airframe(NamedTuple):
     @property
     def aspect_ratio(self) -> float:
         return self.wing_span_m**2 / self.wing_area_m2
+
+
+@kernel
+def loaded(a: Airframe) -> Airframe:
+    """The airframe in numbers of a kernel's own: what follows from them alone is worked out once, not in every step.
+
+    Of numbers in a record the compiler must expect that they change.
+    """
+    return Airframe(
+        a.mass_kg, a.jxx_kg_m2, a.jyy_kg_m2, a.jzz_kg_m2, a.air_density_kg_m3, a.wing_area_m2, a.wing_moment_area_m2,
+        a.wing_span_m, a.chord_m, a.ac_behind_cg_m, a.lift_slope, a.lift_at_zero, a.drag_at_zero, a.oswald,
+        a.moment_slope, a.moment_at_zero, a.stall_angle_rad, a.stall_sharpness, a.plate_drag, a.immersed_fraction,
+        a.flap_area_m2, a.flap_lift_slope, a.flap_moment_slope, a.flap_roll_arm_m, a.flap_max_rad, a.prop_radius_m,
+        a.slipstream_radius_ratio, a.prop_arm_m, a.wake_arm_m, a.thrust_coefficient, a.torque_coefficient,
+        a.thrust_min_N, a.thrust_max_N, a.side_force_factor, a.drag_linear_1_s, a.drag_quadratic_1_m,
+    )  # fmt: skip
 
 
 class Gear(NamedTuple):
