@@ -66,8 +66,7 @@ class Lockstep:
         wall_s = vehicle.now_us * 1e-6
         for datagram in client.poll(wall_s):
             endpoint.receive(datagram, ADDRESS, PortKind.ONBOARD, wall_s)
-        for sent in endpoint.poll(wall_s):
-            client.receive(sent.data, wall_s)
+        client.receive(b"".join([sent.data for sent in endpoint.poll(wall_s)]), wall_s)
         vehicle.advance(vehicle.now_us + turn_us)
 
 

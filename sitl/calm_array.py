@@ -55,7 +55,7 @@ def passes(
     n, e, d = nav.north_m - x[_NEAR_N], nav.east_m - x[_NEAR_N + 1], nav.down_m - x[_NEAR_N + 2]
     if x[_NEAR_M] >= 0.0 and math.sqrt(n * n + e * e + d * d) <= x[_NEAR_M] + 1e-6:
         return False
-    power_W = drawn_W(torque_coefficient, s)
+    power_W = drawn_W(torque_coefficient, s.rotor_left_rad_s, s.rotor_right_rad_s)
     energy_J = x[ENERGY_J] + power_W * TICK_US * 1e-6
     if energy_J >= x[_ENERGY_MOST_J]:
         return False

@@ -242,6 +242,11 @@ def state_of(loop: Array) -> State:
     return State(*loop[:17].tolist())
 
 
+def rotors_of(loop: Array) -> tuple[float, float]:
+    """The propellers' speeds, left and right [rad/s]."""
+    return loop.item(13), loop.item(14)
+
+
 def accuracy_of(loop: Array) -> tuple[float, float]:
     """Standard deviations [m] that the filter gives its own level position and height."""
     variance = loop[_COVARIANCE : _MEMORY : ERRORS + 1].tolist()

@@ -29,6 +29,7 @@ from sitl.loop_arrays import (
     observed_of,
     put_guidance,
     put_loop,
+    rotors_of,
     run_in_place,
     state_of,
 )
@@ -220,6 +221,7 @@ class Vehicle:
         if p.generation == self._generation:
             return
         self._generation = p.generation
+        self._energy_quiet_J = 0.0  # look at the battery at the next tick: its thresholds may be others
         a = self.spec.airframe.airframe
         wind = Wind(p["SIM_WIND_N"], p["SIM_WIND_E"], p["SIM_WIND_D"], p["SIM_GUST"])
         plant = Plant(a, self._gear, self.spec.actuators, self.spec.sensors, wind, self.spec.substeps, self._failures)
@@ -327,21 +329,28 @@ class Vehicle:
         calm = None if self.restless or self.pilot is not None else self.commander.calm()
         if calm is None or calm.until_us <= self._next_tick_us:
             return steps
-        most_J = battery.energy_J(self.commander.battery_lasts(self._remaining)) - _BATTERY_AHEAD_J
-        put_calm(self._calm, calm, int(self._observed_array[-1]), most_J)
+        put_calm(self._calm, calm, int(self._observed_array[-1]), self._energy_quiet_J)
         end_us = min(last_tick_us, self._next_tick_us + _NOISE_US) if self._noisy else last_tick_us
         return max(steps, -(-(end_us - self.now_us) // self.step_us))
 
     def _drain_battery(self) -> None:
-        power_W = battery.drawn_W(self.spec.airframe.airframe.torque_coefficient, state_of(self._loop_array))
+        left, right = rotors_of(self._loop_array)
+        power_W = battery.drawn_W(self.spec.airframe.airframe.torque_coefficient, left, right)
         self._calm[POWER_W] = power_W
-        self._calm[ENERGY_J] += power_W * TICK_US * 1e-6
-        self.commander.watch_battery(self._remaining)
+        energy_J = self._calm.item(ENERGY_J) + power_W * TICK_US * 1e-6
+        self._calm[ENERGY_J] = energy_J
+        if energy_J >= self._energy_quiet_J:
+            self.commander.watch_battery(self._remaining)
+            self._energy_quiet_J = self._quiet_until_J()
+
+    def _quiet_until_J(self) -> float:
+        """Before so much is drawn from the battery there is nothing to tell of it."""
+        return battery.energy_J(self.commander.battery_lasts(self._remaining)) - _BATTERY_AHEAD_J
 
     @property
     def energy_J(self) -> float:
         """Drawn from the battery since it was switched on."""
-        return float(self._calm[ENERGY_J])
+        return self._calm.item(ENERGY_J)
 
     @property
     def _remaining(self) -> float:

@@ -27,6 +27,7 @@ CODES = {  # of struct, by type
 }
 
 
+_new_tuple: Any = tuple.__new__
 _tuple_type: Any = namedtuple  # its types are made at run time, beyond what a type checker follows
 
 
@@ -97,7 +98,7 @@ class Definition:
             payload = payload[:size]
         values = self.struct.unpack(payload)
         if not self._arrays:
-            return self.type._make(values)
+            return _new_tuple(self.type, values)
         fields: list[Any] = []
         k = 0
         for field in self.fields:
@@ -110,7 +111,7 @@ class Definition:
             else:
                 fields.append(values[k])
                 k += 1
-        return self.type._make(fields)
+        return _new_tuple(self.type, fields)
 
 
 def _zero(field: Field) -> Any:

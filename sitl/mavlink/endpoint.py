@@ -17,14 +17,15 @@ from sitl.mavlink.limits import UNLIMITED, Allowance, Limits, cost
 from sitl.mavlink.link import Datagram, Link
 from sitl.mavlink.logs import LogService
 from sitl.mavlink.mission import MissionService
+from sitl.mavlink.news import News
 from sitl.mavlink.offboard import OffboardService
 from sitl.mavlink.parameters import ParameterService
 from sitl.mavlink.peers import Address, Peer, PortKind
 from sitl.mavlink.requests import on_request_data_stream, vehicle_heartbeat
 from sitl.mavlink.routing import Router, target_places
 from sitl.mavlink.signing import Signer, is_signed
-from sitl.mavlink.streams import BY_ID, NEVER, STREAMS
-from sitl.onboard.modes import Event, EventKind, Severity
+from sitl.mavlink.streams import NEVER, STREAMS
+from sitl.onboard.modes import Severity
 from sitl.onboard.plan import Plan
 from sitl.onboard.plans import Plans
 
@@ -38,6 +39,7 @@ log = logging.getLogger(__name__)
 HEARTBEAT_S = 1.0
 REFUSALS_TOLD_S = 10.0  # wall time between two lines in the log about refused datagrams
 _SETUP_SIGNING = by_name("SETUP_SIGNING").id
+_STREAMED = ("SET_POSITION_TARGET_LOCAL_NED", "SET_POSITION_TARGET_GLOBAL_INT", "SET_ATTITUDE_TARGET", "MANUAL_CONTROL")
 Handler = Callable[[Peer, Frame], None]
 
 
@@ -78,7 +80,7 @@ class Endpoint:
         self._ftp = FtpService(link, Files(mounts))
         self._logs = LogService(link, logs)
         self._handlers = self._table()
-        self._event_number = vehicle.events.next_number
+        self._news = News(link, self._parameters)
         self._heartbeat_due_s = float("-inf")
         self._gcs_heard_s: float | None = None
         self._gcs_lost = False
@@ -93,8 +95,10 @@ class Endpoint:
         self.unreadable = 0  # datagrams that held no sound frame
         self.unauthentic = 0  # frames that were not signed, not well, or not for the first time
 
-    def _table(self) -> dict[int, tuple[Handler, int, int]]:
-        """Handlers by message id, with the places of target_system and target_component (−1: it has none)."""
+    def _table(self) -> dict[int, tuple[Handler, int, int, bool]]:
+        """Handlers by message id, with the places of target_system and target_component (−1: it has none), and
+        whether they may begin something that the wall clock or the streams have to do with.
+        """
         p, m, c, o = self._parameters, self._missions, self._commands, self._offboard
         handlers: dict[str, Handler] = {
             "HEARTBEAT": self._on_heartbeat,
@@ -136,7 +140,7 @@ class Endpoint:
         table = {}
         for name, handler in handlers.items():
             definition = by_name(name)
-            table[definition.id] = (handler, *target_places(definition.id))
+            table[definition.id] = (handler, *target_places(definition.id), name not in _STREAMED)
         return table
 
     # --- in
@@ -191,15 +195,16 @@ class Endpoint:
         entry = self._handlers.get(frame.id)
         if entry is None:
             return
-        handler, system_place, component_place = entry
+        handler, system_place, component_place, begins = entry
         values = frame.message
         if system_place >= 0 and values[system_place] not in (0, self._link.system_id):
             return
         if component_place >= 0 and values[component_place] not in (0, COMPONENT_ID):
             return
         handler(peer, frame)
-        self._deadline_s = float("-inf")  # a transfer may have begun, a rate changed: look again at the next poll
-        self._stream_due_us = 0
+        if begins:
+            self._deadline_s = float("-inf")  # a transfer may have begun, a rate changed: look again at the next poll
+            self._stream_due_us = 0
 
     def _greet(self, peer: Peer) -> None:
         self._link.send(peer, vehicle_heartbeat(self._link))
@@ -245,8 +250,9 @@ class Endpoint:
         link.wall_s = wall_s
         if link.signer is not None:
             link.signer.keep_time(wall_s)
-        if vehicle.events.next_number != self._event_number:
-            self._tell_events()
+        if self._news.waiting and self._news.tell():
+            self._beat()
+            self._deadline_s = float("-inf")
         if wall_s >= self._deadline_s:
             self._keep_time()
         now_us = vehicle.now_us
@@ -323,48 +329,6 @@ class Endpoint:
         self._gcs_lost = True
         self._vehicle.commander.link_lost(True)
         return float("inf")
-
-    # --- what has happened on board
-
-    def _tell_events(self) -> None:
-        events = self._vehicle.events.since(self._event_number)
-        self._event_number = self._vehicle.events.next_number
-        for event in events:
-            teller = self._TELLERS.get(event.kind)
-            if teller is not None:
-                teller(self, event)
-        if any(event.kind in (EventKind.MODE, EventKind.ARMED) for event in events):
-            self._beat()
-            self._deadline_s = float("-inf")
-
-    def _tell_text(self, event: Event) -> None:
-        self._link.tell(None, event.severity, event.text)
-
-    def _tell_parameter(self, event: Event) -> None:
-        self._parameters.on_change(event)
-
-    def _tell_reached(self, event: Event) -> None:
-        self._link.broadcast(message("MISSION_ITEM_REACHED", seq=event.value))
-
-    def _tell_stream(self, *names: str) -> None:
-        """What normally flows slowly, at once."""
-        view = self._link.view()
-        for k in (k for name in names for k in BY_ID[by_name(name).id]):
-            payload = STREAMS[k].payload(view)
-            if payload:
-                self._link.broadcast_packed(STREAMS[k].definition, payload)
-
-    _TELLERS: "dict[EventKind, Callable[[Endpoint, Event], None]]" = {  # noqa: RUF012
-        EventKind.TEXT: _tell_text,
-        EventKind.PARAMETER: _tell_parameter,
-        EventKind.ITEM_REACHED: _tell_reached,
-        EventKind.ITEM_CURRENT: lambda self, _event: self._tell_stream("MISSION_CURRENT"),
-        EventKind.PLAN: lambda self, _event: self._tell_stream("MISSION_CURRENT"),
-        EventKind.FENCE: lambda self, _event: self._tell_stream("FENCE_STATUS"),
-        EventKind.MODE: lambda self, _event: self._tell_stream("CURRENT_MODE", "MISSION_CURRENT"),
-        EventKind.LANDED: lambda self, _event: self._tell_stream("EXTENDED_SYS_STATE"),
-        EventKind.HOME: lambda self, _event: self._tell_stream("HOME_POSITION"),
-    }
 
     # --- what the caller may ask and set
 

@@ -1,7 +1,6 @@
 """The battery: a three-cell 2200 mAh pack, linear between full and empty; propulsion as a whole is half efficient."""
 
 from sitl.jit import kernel
-from sitl.model.rigid_body import State
 
 FULL_V, EMPTY_V, CAPACITY_MAH = 12.6, 10.5, 2200.0
 IDLE_W = 3.0
@@ -10,9 +9,9 @@ _J_PER_MAH = 0.5 * (FULL_V + EMPTY_V) * 3.6
 
 
 @kernel
-def drawn_W(torque_coefficient: float, s: State) -> float:
+def drawn_W(torque_coefficient: float, rotor_left_rad_s: float, rotor_right_rad_s: float) -> float:
     """Power of propulsion and electronics [W]: C_μ ω³ of both propellers at the shaft."""
-    left, right = abs(s.rotor_left_rad_s), abs(s.rotor_right_rad_s)
+    left, right = abs(rotor_left_rad_s), abs(rotor_right_rad_s)
     return IDLE_W + torque_coefficient * (left * left * left + right * right * right) / _EFFICIENCY
 
 

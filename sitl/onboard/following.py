@@ -42,8 +42,11 @@ class Following:
                 self._steer(fix, offboard.attitude)
                 return
             self.lifting = None
-            start = guide.motion(fix)
-            guide.put(offboard.trajectory(fix.now_us, start.heading_rad, start.position_N), offboard.follow())
+            heading_rad, position_N = 0.0, fix.position_N
+            if not offboard.places:
+                start = guide.motion(fix)
+                heading_rad, position_N = start.heading_rad, start.position_N
+            guide.put(offboard.trajectory(fix.now_us, heading_rad, position_N), offboard.follow())
         elif offboard.moving and not self._halting and fix.t_s >= guide.trajectory.end_s - _STOP_AHEAD_S:
             self._halting = True
             guide.stop(fix)

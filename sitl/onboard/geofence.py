@@ -58,12 +58,12 @@ class Geofence:
     @property
     def present(self) -> bool:
         """Whether there is anything to keep to."""
-        return bool(self._fence.areas) or any(self._p[name] > 0.0 for name in ("GF_MAX_HOR_DIST", "GF_MAX_VER_DIST"))
+        return bool(self._fence.areas) or self._p["GF_MAX_HOR_DIST"] > 0.0 or self._p["GF_MAX_VER_DIST"] > 0.0
 
     @property
     def limits(self) -> tuple[float, ...]:
         """The parameters that a violation depends on."""
-        return tuple(self._p[name] for name in ("GF_ACTION", "GF_MAX_HOR_DIST", "GF_MAX_VER_DIST"))
+        return self._p["GF_ACTION"], self._p["GF_MAX_HOR_DIST"], self._p["GF_MAX_VER_DIST"]
 
     def shut_out(self, point: GeoPoint) -> str:
         """Why home can't be at a place: it must lie within the stored fence, whatever GF_ACTION says."""

@@ -17,6 +17,8 @@ _REORDERED_US = 200_000  # a stamp older than the newest by no more comes from t
 _CARRY_S = 0.2  # a target is carried forward by this much at most
 _SPACING_S = (0.005, 0.2)  # of two targets whose accelerations tell a jerk
 _JERK_MAX = 20.0  # m/s³
+_MOST = 1e6  # m, m/s, m/s²
+_ALL = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
 _NONE: Vec3 = (math.nan, math.nan, math.nan)
 
 
@@ -122,16 +124,9 @@ class Offboard:
 
         One that was overtaken on its way, by a target with a later stamp, shows that the stream lives and is left out.
         """
-        numbers = (*target.position_N, *target.velocity_N, *target.acceleration_N)
-        if any(math.isinf(x) for x in (*numbers, target.heading_rad, target.heading_rate_rad_s)):
-            return Outcome(Verdict.DENIED, "offboard target is infinite")
-        if all(math.isnan(x) for x in (*numbers, target.heading_rad, target.heading_rate_rad_s)):
-            return Outcome(Verdict.DENIED, "offboard target ignores everything")
-        if any(abs(x) > 1e6 for x in numbers if not math.isnan(x)):
-            return Outcome(Verdict.DENIED, "offboard target is further than 1000 km or faster than sense")
-        outside = self._objection(target.position_N, "offboard target")
-        if outside:
-            return Outcome(Verdict.DENIED, outside)
+        fault = self._fault(target)
+        if fault:
+            return Outcome(Verdict.DENIED, fault)
         self._arrived_us = now_us
         stamp = target.stamp_us
         stamped = stamp is not None and abs(now_us - stamp) <= _STAMP_WINDOW_US
@@ -144,6 +139,21 @@ class Offboard:
         self.attitude = None
         self.number += 1
         return ACCEPTED
+
+    def _fault(self, target: OffboardTarget) -> str:
+        """Why a target can't be taken, or nothing."""
+        numbers = (*target.position_N, *target.velocity_N, *target.acceleration_N)
+        turning = target.heading_rad, target.heading_rate_rad_s
+        if not sum(map(abs, numbers)) < _MOST:  # all of them there and small: nothing else to ask
+            if any(map(math.isinf, numbers)):
+                return "offboard target is infinite"
+            if all(map(math.isnan, (*numbers, *turning))):
+                return "offboard target ignores everything"
+            if any(abs(x) > _MOST for x in numbers):
+                return "offboard target is further than 1000 km or faster than sense"
+        if any(map(math.isinf, turning)):
+            return "offboard target is infinite"
+        return self._objection(target.position_N, "offboard target")
 
     def submit_attitude(self, target: AttitudeTarget, now_us: int) -> Outcome:
         """Take an attitude or body rates with a thrust. Refused when a number is missing or out of range."""
@@ -208,7 +218,7 @@ class Offboard:
         if target is None:
             raise ValueError("there is no offboard target yet")
         now, stamp = now_us * 1e-6, max(self._stamp_us * 1e-6, now_us * 1e-6 - _CARRY_S)
-        c = np.zeros((1, 4, DEGREE + 1))
+        c: list[tuple[float, ...]] = []
         start = min(stamp, now)
         early = stamp - start  # a stamp ahead of now: begin now, on the same polynomial
         age = now - start
@@ -223,22 +233,24 @@ class Offboard:
             if math.isnan(p):  # not followed: told from where the vehicle is now
                 p = position_N[i] - age * (v + age * (a / 2.0 + age * j / 6.0))
                 p += early * (v - early * (a / 2.0 - early * j / 6.0))
-            c[0, i, 0] = p - early * (v - early * (a / 2.0 - early * j / 6.0))
-            c[0, i, 1] = v - early * (a - early * j / 2.0)
-            c[0, i, 2] = (a - early * j) / 2.0
-            c[0, i, 3] = j / 6.0
+            x = p - early * (v - early * (a / 2.0 - early * j / 6.0))
+            c.append((x, v - early * (a - early * j / 2.0), (a - early * j) / 2.0, j / 6.0, 0.0, 0.0))
         rate = _or_zero(target.heading_rate_rad_s)
-        if math.isnan(target.heading_rad):
-            c[0, 3, 0] = heading_rad - age * rate
-        else:
-            c[0, 3, 0] = target.heading_rad - early * rate
-        c[0, 3, 1] = rate
-        return Trajectory(np.array([start]), c, max(stamp, now) + _CARRY_S)
+        told = not math.isnan(target.heading_rad)
+        heading = target.heading_rad - early * rate if told else heading_rad - age * rate
+        c.append((heading, rate, 0.0, 0.0, 0.0, 0.0))
+        return Trajectory(np.array([start]), np.array([c]), max(stamp, now) + _CARRY_S)
+
+    @property
+    def places(self) -> bool:
+        """Whether the newest target tells a position and a heading, so that none in force matter to its trajectory."""
+        t = self.target
+        return t is not None and not math.isnan(sum(t.position_N) + t.heading_rad)
 
     def _free(self, axis: int) -> bool:
         """Whether the newest target binds nothing on an axis."""
-        t = self.target
-        return t is None or all(math.isnan(x[axis]) for x in (t.position_N, t.velocity_N, t.acceleration_N))
+        t, nan = self.target, math.isnan
+        return t is None or (nan(t.position_N[axis]) and nan(t.velocity_N[axis]) and nan(t.acceleration_N[axis]))
 
     def follow(self) -> tuple[float, float, float, float, float, float]:
         """Guidance's follow flags: position then velocity, per axis.
@@ -247,8 +259,8 @@ class Offboard:
         alone lets go of the position; one with an acceleration alone lets go of both.
         """
         target = self.target
-        if target is None:
-            return (1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
+        if target is None or not math.isnan(sum(target.position_N)):
+            return _ALL
         positions = [0.0 if math.isnan(p) and not self._free(i) else 1.0 for i, p in enumerate(target.position_N)]
         velocities = [
             0.0 if p == 0.0 and math.isnan(v) else 1.0 for p, v in zip(positions, target.velocity_N, strict=True)
