@@ -25,13 +25,14 @@ NORTH_N = (1.0, 0.0, 0.0)
 FOLLOWING = ("chase", "side", "top")
 NAMES = (*FOLLOWING, "onboard", "free")
 FIRST = "chase"
-OFFSETS_H_M = {"chase": (-1.7, 0.5, -0.75), "side": (0.0, 1.9, -0.15), "top": (0.0, 0.0, -5.0)}
+OFFSETS_H_M = {"chase": (-1.25, 0.45, -0.5), "side": (0.0, 1.6, -0.1), "top": (0.0, 0.0, -4.0)}
 """From the vehicle to the camera: ahead (where the belly faces), right, down."""
 ONBOARD_B_M = (0.06, 0.0, 0.075)  # before the belly, below the nose
 TURN_TAU_S = 0.8  # with which chase and side turn after the vehicle's heading
 SAME = 0.02  # two offsets that differ by less of their length are one
 REMEMBERED_S = 1.5  # how late a browser may report what it was told
 LET_GO_S = 0.25  # after the last report by hand
+SETTLE_S = 1.0  # after a choice, while reports are still of the camera before
 
 
 class View(NamedTuple):
@@ -65,13 +66,15 @@ class Rig:
         self._wall_s = 0.0
         self._told: deque[tuple[float, Vector]] = deque()
         self._by_hand_s = float("-inf")
+        self._settled_s: float | None = None  # None: not yet begun
 
     def choose(self, name: str) -> None:
         """Switch, and forget what the user made of this camera before."""
         self.name = name
         if name in OFFSETS_H_M:
             self._offsets[name] = np.array(OFFSETS_H_M[name])
-        self._heading_rad = None
+        self._heading_rad = self._settled_s = None
+        self._by_hand_s = float("-inf")
         self._told.clear()
 
     def view(self, position: Vector, q_NB: Quadruple, heading_rad: float, wall_s: float) -> View | None:
@@ -80,6 +83,8 @@ class Rig:
             return onboard(position, q_NB)
         if self.name not in FOLLOWING or wall_s < self._by_hand_s + LET_GO_S:
             return None
+        if self._settled_s is None:
+            self._settled_s = wall_s + SETTLE_S
         self._turn(heading_rad, wall_s)
         offset = turned(self._offsets[self.name], self._heading_rad or 0.0)
         while self._told and self._told[0][0] < wall_s - REMEMBERED_S:
@@ -100,7 +105,7 @@ class Rig:
 
     def reported(self, position: Vector, look_at: Vector, wall_s: float) -> None:
         """The browser's pose, its own or as it was told."""
-        if self.name not in FOLLOWING or not self._told:
+        if self.name not in FOLLOWING or self._settled_s is None or wall_s < self._settled_s:
             return
         offset = position - look_at
         tolerance = SAME * float(np.linalg.norm(offset))

@@ -160,6 +160,8 @@ class _Listener:
         vehicle = self._vehicle
         if vehicle.description is None:
             self._question(wall_s, "*")
+        elif vehicle.mission is not None and vehicle.mode and vehicle.mode.mission_plan_id != vehicle.mission.plan_id:
+            self._question(wall_s, "mission")
         elif self._parameters_asked != (number := self._newest_change()):
             if self._question(wall_s, "parameters"):
                 self._parameters_asked = number

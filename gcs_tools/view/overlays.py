@@ -10,6 +10,7 @@ from viser import SceneApi
 from gcs_tools.view import forces
 from gcs_tools.view.airframe_mesh import Dimensions
 from gcs_tools.view.history import INDEX
+from gcs_tools.view.mission_path import MissionPath
 from gcs_tools.view.topics import Triple
 from gcs_tools.view.vehicle import Instant, Vehicle
 
@@ -22,7 +23,7 @@ CALM_M_S = 0.05
 NOTHING = np.zeros((1, 2, 3), dtype=np.float32)
 _POSITION = [INDEX[name] for name in ("north_m", "east_m", "down_m")]
 _REFERENCE = [INDEX[name] for name in ("reference_north_m", "reference_east_m", "reference_down_m")]
-_SCALE_RGB = np.array([(40, 200, 190), (120, 220, 90), (250, 200, 60), (240, 70, 60)], dtype=float)
+_SCALE_RGB = np.array([(0, 150, 140), (70, 180, 30), (240, 150, 0), (220, 20, 20)], dtype=float)
 
 
 def thinned(rows: NDArray[np.float64], most: int) -> NDArray[np.float64]:
@@ -53,6 +54,7 @@ class Shown(NamedTuple):
 
     trail: bool = True
     reference: bool = True
+    mission: bool = True
     wind: bool = True
     wake: bool = True
     forces: bool = False
@@ -72,6 +74,8 @@ class Overlays:
         self._home = scene.add_frame(f"{root}/home", axes_length=0.25, axes_radius=0.006, origin_radius=0.012)
         scene.add_label(f"{root}/home/label", "home", font_screen_scale=0.8)
         self._ground_down_m = ground_down_m
+        self._mission = MissionPath(scene, root, ground_down_m)
+        self._added = 0  # rows of the history when the paths were drawn
         self._wind: Any = scene.add_arrows(
             f"{root}/wind", NOTHING, (120, 220, 255), shaft_radius=0.012, head_radius=0.035, head_length=0.08
         )
@@ -85,6 +89,8 @@ class Overlays:
         self._trail.visible, self._reference.visible = shown.trail, shown.reference
         self._wind.visible = self._wind_label.visible = shown.wind
         self._forces.visible = shown.forces
+        self._mission.visible = shown.mission
+        self._added = 0
 
     def update(self, vehicle: Vehicle, instant: Instant) -> None:
         """What moves with the vehicle."""
@@ -95,6 +101,15 @@ class Overlays:
 
     def update_slowly(self, vehicle: Vehicle) -> None:
         """What need not follow every instant."""
+        self._mission.update(vehicle)
+        if vehicle.mode is not None:
+            north, east, down = vehicle.mode.home_N_m
+            self._home.position = (north, east, down + self._ground_down_m)
+        if vehicle.history.added != self._added:
+            self._added = vehicle.history.added
+            self._draw_paths(vehicle)
+
+    def _draw_paths(self, vehicle: Vehicle) -> None:
         rows = thinned(vehicle.history.last(TRAIL_S), TRAIL_POINTS)
         if len(rows) > 1 and self._trail.visible:
             error_m = np.linalg.norm(rows[:, _POSITION] - rows[:, _REFERENCE], axis=1)
@@ -103,9 +118,6 @@ class Overlays:
             self._trail.colors = np.stack([colours[:-1], colours[1:]], axis=1)
         if len(rows) > 1 and self._reference.visible:
             self._reference.points = segments(rows[:, _REFERENCE])
-        if vehicle.mode is not None:
-            north, east, down = vehicle.mode.home_N_m
-            self._home.position = (north, east, down + self._ground_down_m)
 
     def _draw_wind(self, position_N_m: Triple, wind_N_m_s: Triple) -> None:
         """Above the vehicle, with its middle over it."""

@@ -86,5 +86,7 @@ def _events(v: Vehicle) -> str:
     for e in list(v.events)[-EVENTS_SHOWN:]:
         colour = "color:#e8590c" if e.severity <= _SEVERE else ""
         when = f'<span style="opacity:.6">{e.now_us * 1e-6:8.1f} s</span>'
-        lines.append(f'<div style="{colour}">{when}  {html.escape(e.kind)}: {html.escape(e.text)}</div>')
+        lines.append(
+            f'<div style="{colour}">{when}  {html.escape(e.kind)}: {html.escape(e.text or str(e.value))}</div>'
+        )
     return f'<div style="font-size:12px;margin:.4em .8em;white-space:pre-wrap">{"".join(lines)}</div>'

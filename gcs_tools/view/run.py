@@ -7,6 +7,7 @@ import io
 import logging
 import socket
 import time
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -76,6 +77,7 @@ def open_server(host: str, port: int) -> Any:
         raise ConfigError(f"{host}:{port} {reason}; choose another with --port") from None
     for name in ("websockets", "websockets.server"):
         logging.getLogger(name).setLevel(logging.CRITICAL)  # a browser that goes away is no error
+    warnings.filterwarnings("ignore", "Queued a", UserWarning)  # nor is what was on its way to it
     with _quiet():
         server = viser.ViserServer(host, port, label="YawSitter", verbose=False)
     if server.get_port() != port:  # somebody was quicker

@@ -128,12 +128,26 @@ class Parameters(msgspec.Struct, frozen=True):
     parameters: list[Parameter]
 
 
+class Item(msgspec.Struct, frozen=True, gc=False):
+    index: int
+    command: str
+    position_N_m: Triple | None
+
+
+class Mission(msgspec.Struct, frozen=True):
+    now_us: int
+    plan_id: int
+    items: list[Item]
+
+
 class Description(msgspec.Struct, frozen=True):
     instance: int
     vehicle: dict[str, Any]
 
 
-Message = State | Attitude | Setpoint | Actuators | Loads | Mode | Loop | Event | Events | Parameters | Description
+Message = (
+    State | Attitude | Setpoint | Actuators | Loads | Mode | Loop | Event | Events | Parameters | Mission | Description
+)
 
 TYPES: dict[str, type] = {
     "state": State,
@@ -146,6 +160,7 @@ TYPES: dict[str, type] = {
     "event": Event,
     "events": Events,
     "parameters": Parameters,
+    "mission": Mission,
     "description": Description,
 }
 SAMPLED = ("state", "attitude", "setpoint", "actuators", "loads")

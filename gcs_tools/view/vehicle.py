@@ -43,6 +43,7 @@ class Vehicle:
         self.mode: topics.Mode | None = None
         self.loop: topics.Loop | None = None
         self.description: dict[str, Any] | None = None  # the vehicle's own, without the list of topics
+        self.mission: topics.Mission | None = None  # as stored in the vehicle
         self.parameters: dict[str, topics.Parameter] = {}
         self.events: deque[topics.Event] = deque(maxlen=EVENTS_KEPT)
         self.history = History()
@@ -54,6 +55,7 @@ class Vehicle:
             "event": self._take_event,
             "events": self._take_events,
             "parameters": self._take_parameters,
+            "mission": self._take_mission,
             "description": self._take_description,
         }
 
@@ -81,7 +83,7 @@ class Vehicle:
     def forget(self) -> None:
         """Begin anew: what comes next does not continue what was."""
         self.epoch += 1
-        self.instant = self.mode = self.loop = self.description = None
+        self.instant = self.mode = self.loop = self.mission = self.description = None
         self.parameters = {}
         self.events.clear()
         self._waiting.clear()
@@ -118,6 +120,9 @@ class Vehicle:
 
     def _take_parameters(self, message: topics.Parameters) -> None:
         self.parameters.update((p.name, p) for p in message.parameters)
+
+    def _take_mission(self, message: topics.Mission) -> None:
+        self.mission = message
 
     def _take_description(self, message: topics.Description) -> None:
         self.description = message.vehicle

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 PERIOD_S = 0.2
 _ERROR_SCALE = (
     '<div style="font-size:12px;margin:.2em 1em .8em"><div style="height:8px;border-radius:4px;background:'
-    'linear-gradient(90deg,#28c8be,#78dc5a,#fac83c,#f0463c)"></div><div style="display:flex;'
+    'linear-gradient(90deg,#009690,#46b41e,#f09600,#dc1414)"></div><div style="display:flex;'
     f'justify-content:space-between;opacity:.7"><span>0</span><span>distance from the reference</span>'
     f"<span>≥ {ERROR_FULL_M * 100:.0f} cm</span></div></div>"
 )
@@ -27,6 +27,7 @@ class ViewTab:
             self._boxes = {
                 "trail": gui.add_checkbox("flown path", True),
                 "reference": gui.add_checkbox("reference", True),
+                "mission": gui.add_checkbox("mission", True),
                 "wind": gui.add_checkbox("wind", True),
                 "wake": gui.add_checkbox("slipstreams", True),
                 "forces": gui.add_checkbox("forces", False),

@@ -57,7 +57,7 @@ class FlightRecorder:
     def _begin(self, unix_s: float) -> None:
         vehicle, origin = self._vehicle, self._vehicle.snapshot().origin
         self._recorder.begin(unix_s, vehicle.now_us, (origin.lat_deg, origin.lon_deg, origin.alt_amsl_m))
-        for topic in (keys.DESCRIPTION, keys.PARAMETERS, keys.MODE):
+        for topic in (keys.DESCRIPTION, keys.PARAMETERS, keys.MISSION, keys.MODE):
             self._put(topic, vehicle.now_us, self._feed.latest(topic))
         self._trigger = messages.mode_trigger(vehicle.snapshot())
 
@@ -72,6 +72,8 @@ class FlightRecorder:
             return
         for event in vehicle.events.since(self._next_event):
             self._put(keys.EVENT, event.now_us, messages.encode(messages.event(event)))
+            if event.kind is EventKind.PLAN:
+                self._put(keys.MISSION, event.now_us, self._feed.latest(keys.MISSION))
             if event.kind is EventKind.PARAMETER and event.text in vehicle.parameters:
                 changed = messages.parameters(event.now_us, vehicle.parameters, [event.text])
                 self._put(keys.PARAMETERS, event.now_us, messages.encode(changed))

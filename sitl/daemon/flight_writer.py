@@ -50,6 +50,7 @@ _SCHEMAS: dict[Topic, Any] = {
     keys.MODE: messages.ModeMessage,
     keys.EVENT: messages.EventMessage,
     keys.PARAMETERS: messages.ParametersMessage,
+    keys.MISSION: messages.MissionMessage,
     keys.DESCRIPTION: dict[str, Any],
 }
 

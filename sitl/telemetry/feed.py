@@ -13,6 +13,7 @@ from sitl.telemetry.keys import Topic
 if TYPE_CHECKING:
     from sitl.onboard.events import EventLog
     from sitl.onboard.parameters import Parameters
+    from sitl.onboard.plans import Plans
     from sitl.snapshot import Snapshot
 
 BURST_S = 0.1  # samples of this much wall time may follow each other at once, when the loop catches up
@@ -29,6 +30,8 @@ class Subject(Protocol):
     def now_us(self) -> int: ...
     @property
     def parameters(self) -> "Parameters": ...
+    @property
+    def plans(self) -> "Plans": ...
     @property
     def events(self) -> "EventLog": ...
     def snapshot(self) -> "Snapshot": ...
@@ -100,6 +103,7 @@ class Feed:
             keys.LOOP: loop,
             keys.EVENTS: self._events,
             keys.PARAMETERS: lambda: messages.parameters(vehicle.now_us, vehicle.parameters),
+            keys.MISSION: lambda: messages.mission(vehicle.now_us, vehicle.plans.mission, vehicle.plans.places),
             keys.DESCRIPTION: lambda: messages.description(
                 vehicle.description(), instance, vehicle.parameters["SIM_TLM_RATE"]
             ),

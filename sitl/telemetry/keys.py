@@ -38,6 +38,7 @@ LOOP = Topic("loop", Cadence.SECOND, JSON, True)
 EVENT = Topic("event", Cadence.EVENT, JSON, False)
 EVENTS = Topic("events", Cadence.QUERY, JSON, True)
 PARAMETERS = Topic("parameters", Cadence.QUERY, JSON, True)
+MISSION = Topic("mission", Cadence.QUERY, JSON, True)
 DESCRIPTION = Topic("description", Cadence.QUERY, JSON, True)
 MAVLINK_OUT = Topic("mavlink/out", Cadence.FRAMES, BYTES, False)
 MAVLINK_IN = Topic("mavlink/in", Cadence.FRAMES, BYTES, False)
@@ -56,6 +57,7 @@ TOPICS = (
     DESCRIPTION,
     MAVLINK_OUT,
     MAVLINK_IN,
+    MISSION,
 )
 
 

@@ -12,6 +12,7 @@ import msgspec
 
 from sitl.frames import heading, quaternion_to_yxz
 from sitl.geodesy import to_global
+from sitl.onboard.mission_items import ItemCommand, has_place
 from sitl.onboard.modes import Event
 from sitl.telemetry.keys import TOPICS
 
@@ -21,9 +22,12 @@ if TYPE_CHECKING:
     from sitl.geodesy import GeoPoint
     from sitl.model.rigid_body import State
     from sitl.navigation import NavState
+    from sitl.onboard.mission import Mission
     from sitl.onboard.parameters import Parameters
+    from sitl.onboard.places import Places
     from sitl.snapshot import Snapshot
 
+ITEMS_MAX = 500  # of a mission told; building more takes longer than the loop has
 VERSION = 1  # of the schema: goes up when a field changes its meaning or goes away, not when one is added
 
 Triple = tuple[float, float, float]
@@ -217,6 +221,19 @@ class ParametersMessage(msgspec.Struct, frozen=True):
     parameters: list[ParameterMessage]
 
 
+class MissionItemMessage(msgspec.Struct, frozen=True, gc=False):
+    index: int
+    command: str
+    position_N_m: Triple | None
+
+
+class MissionMessage(msgspec.Struct, frozen=True):
+    now_us: int
+    plan_id: int
+    total: int
+    items: list[MissionItemMessage]
+
+
 def _yxz_deg(w: float, x: float, y: float, z: float) -> Triple:
     phi, theta, psi = quaternion_to_yxz(w, x, y, z)
     return math.degrees(phi), math.degrees(theta), math.degrees(psi)
@@ -361,6 +378,17 @@ def event(e: Event) -> EventMessage:
 
 def events(next_number: int, log: Iterable[Event]) -> EventsMessage:
     return EventsMessage(next_number, [event(e) for e in log])
+
+
+def mission(now_us: int, stored: "Mission", places: "Places") -> MissionMessage:
+    """The first ITEMS_MAX items, with the point of those that have one."""
+    items = []
+    for index, item in enumerate(stored.items[:ITEMS_MAX]):
+        point = places.of(item, places.home_N) if has_place(item) else None
+        if point is not None and not all(map(math.isfinite, point)):
+            point = None
+        items.append(MissionItemMessage(index, ItemCommand(item.command).name.lower().replace("_", " "), point))
+    return MissionMessage(now_us, stored.plan_id, len(stored.items), items)
 
 
 def parameters(now_us: int, p: "Parameters", names: Iterable[str] | None = None) -> ParametersMessage:

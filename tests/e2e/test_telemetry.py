@@ -136,7 +136,7 @@ def test_the_latest_of_everything_can_be_asked_for_in_one_query(session, daemon)
     answers = {
         key.split("/", 2)[2]: json.loads(data) for key, data in ask(session, f"yawsitter/{daemon.instance}/*").items()
     }
-    assert {*SAMPLED, "mode", "loop", "events", "parameters", "description"} == set(answers)
+    assert {*SAMPLED, "mode", "loop", "events", "parameters", "mission", "description"} == set(answers)
     assert answers["mode"]["mode"] == "hold"
     assert answers["mode"]["armed"] is False
     gains = {entry["name"]: entry for entry in answers["parameters"]["parameters"]}

@@ -21,6 +21,7 @@ SECTIONS = {
     "loop": messages.LoopMessage,
     "event, events": messages.EventMessage,
     "parameters": messages.ParameterMessage,
+    "mission": messages.MissionMessage,
 }
 
 

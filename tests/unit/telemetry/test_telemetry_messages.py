@@ -13,8 +13,13 @@ from sitl.frames import quaternion_from_yxz, standing
 from sitl.geodesy import GeoPoint
 from sitl.model.rigid_body import State
 from sitl.navigation import NavState
-from sitl.onboard.mission import MissionState
+from sitl.onboard.events import EventLog
+from sitl.onboard.mission import Mission, MissionState
+from sitl.onboard.mission_items import ItemCommand
 from sitl.onboard.modes import Event, EventKind, Landed, Mode, Severity
+from sitl.onboard.places import Places
+from sitl.onboard.plan import Frame, MissionItem
+from sitl.onboard.store import MemoryStore
 from sitl.quaternion import rotate
 from sitl.snapshot import Battery, Snapshot
 from sitl.telemetry import keys, messages
@@ -180,3 +185,29 @@ def test_the_documented_conversion_to_three_js_keeps_rotations() -> None:
     w, x, y, z = Q
     for v in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.3, -0.7, 2.0)):
         assert _rotated((y, -z, -x, w), vector(v)) == pytest.approx(vector(rotate(Q, v)))
+
+
+def test_the_mission_tells_where_its_items_are_whatever_frame_they_came_in() -> None:
+    places = Places(GeoPoint(55.0, 37.0, 190.0))
+    mission = Mission(MemoryStore(), EventLog())
+    flat = (0, 1, 0.0, 0.0, 0.0, math.nan)
+    items = [
+        MissionItem(Frame.LOCAL_NED, ItemCommand.TAKEOFF, *flat, 0, 0, -5.0),
+        MissionItem(Frame.GLOBAL_RELATIVE_ALT_INT, ItemCommand.WAYPOINT, *flat, 550001000, 370000000, 20.0),
+        MissionItem(Frame.MISSION, ItemCommand.RETURN_TO_LAUNCH, 0, 1, 0.0, 0.0, 0.0, 0.0, 0, 0, 0.0),
+    ]
+    assert mission.replace(items) is None
+    told = json.loads(messages.encode(messages.mission(7, mission, places)))
+    assert (told["now_us"], told["plan_id"], told["total"]) == (7, mission.plan_id, 3)
+    assert [item["command"] for item in told["items"]] == ["takeoff", "waypoint", "return to launch"]
+    assert told["items"][0]["position_N_m"] == [0.0, 0.0, -5.0]
+    assert told["items"][1]["position_N_m"] == pytest.approx([11.1, 0.0, -20.0], abs=0.1)
+    assert told["items"][2]["position_N_m"] is None
+
+
+def test_of_a_very_long_mission_only_the_first_items_are_told() -> None:
+    mission = Mission(MemoryStore(), EventLog())
+    item = MissionItem(Frame.LOCAL_NED, ItemCommand.WAYPOINT, 0, 1, 0.0, 0.0, 0.0, math.nan, 0, 0, -5.0)
+    assert mission.replace([item] * (messages.ITEMS_MAX + 1)) is None
+    told = messages.mission(0, mission, Places(GeoPoint(55.0, 37.0, 190.0)))
+    assert (told.total, len(told.items)) == (messages.ITEMS_MAX + 1, messages.ITEMS_MAX)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from gcs_tools.view.cameras import LET_GO_S, OFFSETS_H_M, Rig, View, turned
+from gcs_tools.view.cameras import LET_GO_S, OFFSETS_H_M, SETTLE_S, Rig, View, turned
 from sitl.frames import standing
 
 HOVER = standing(0.0, math.pi / 2)
@@ -67,6 +67,7 @@ def test_reports_of_what_a_camera_was_told_change_nothing_however_late_and_fast_
 
 def test_what_a_hand_made_of_the_camera_is_kept_and_goes_with_the_vehicle() -> None:
     rig = Rig()
+    at(rig, -SETTLE_S)
     at(rig, 0.0)
     rig.reported(HERE + np.array([0.0, 3.0, -1.0]), HERE, 0.1)
     assert rig.view(HERE, HOVER, 0.0, 0.1 + 0.5 * LET_GO_S) is None  # left alone while the hand is on it
@@ -77,9 +78,18 @@ def test_what_a_hand_made_of_the_camera_is_kept_and_goes_with_the_vehicle() -> N
 
 def test_choosing_a_camera_puts_it_where_it_belongs_and_a_free_one_is_left_alone() -> None:
     rig = Rig()
-    at(rig, 0.0)
+    at(rig, -SETTLE_S)
     rig.reported(HERE + np.array([0.0, 3.0, -1.0]), HERE, 0.1)
     rig.choose("free")
     assert rig.view(HERE, HOVER, 0.0, 9.0) is None
     rig.choose("chase")
     assert at(rig, 10.0).position - HERE == pytest.approx(OFFSETS_H_M["chase"])
+
+
+def test_a_late_report_of_the_camera_before_does_not_spoil_the_one_just_chosen() -> None:
+    rig = Rig()
+    before = at(rig, 0.0)
+    rig.choose("top")
+    at(rig, 5.0)
+    rig.reported(before.position, before.look_at, 5.3)
+    assert at(rig, 5.4).position == pytest.approx(HERE + OFFSETS_H_M["top"])
