@@ -85,6 +85,9 @@ MISSIONS = {
         UP, item(16, 3.0, 0.0, -3.0), item(178, 0, 0, 0, 1.0, 1.0, -1.0), item(82, 3.0, 3.0, -3.0),
         item(82, 0.0, 3.0, -3.0), item(177, 0, 0, 0, 1.0, 1.0), item(20),
     ),
+    "a distance, points met closely": (
+        UP, item(114, 0, 0, 0, 3.0), item(16, 8.0, 0.0, -3.0, 0.0, 0.03), item(16, 8.0, 2.0, -3.0, 0.3, 0.014), DOWN,
+    ),
     "a distance, a place to face": (
         UP, item(201, 5.0, 5.0, 0.0, 3.0), item(114, 0, 0, 0, 3.0), item(16, 8.0, 0.0, -3.0), item(197), DOWN,
     ),
@@ -121,6 +124,11 @@ REQUESTS: dict[str, tuple[Script, float, float]] = {
         [(0.1, lambda v: v.commander.takeoff()), (0.2, lambda v: v.commander.arm()),
          (7.0, lambda v: v.commander.guided.orbit((3.0, 0.0, -2.5), 3.0, 1.5, Look.POINT, math.inf))],
         20.0, 1.0,
+    ),
+    "an orbit without end": (
+        [(0.1, lambda v: v.commander.takeoff()), (0.2, lambda v: v.commander.arm()),
+         (7.0, lambda v: v.commander.guided.orbit((1.0, 0.0, -2.5), 1.0, 1.5, Look.AHEAD, math.inf))],
+        30.0, 0.5,
     ),
     "sticks": (
         [(0.1, lambda v: v.commander.takeoff()), (0.2, lambda v: v.commander.arm()),
@@ -162,6 +170,17 @@ def test_what_is_watched_is_noticed_at_the_very_tick(settings: dict[str, float],
     assert any(told in e.text for e in events)
 
 
+def test_a_vehicle_that_has_begun_to_lie_is_looked_at_until_it_stands() -> None:
+    craft = Vehicle(SPECS["yawsitter"])
+    craft.advance(20_000)
+    assert craft.commander.calm() is not None
+    nav = craft.snapshot().nav
+    craft.commander.tick(40_000, nav._replace(qw=1.0, qx=0.0, qy=0.0, qz=0.0), 2)
+    assert craft.commander.calm() is None
+    craft.commander.tick(60_000, nav, 4)
+    assert craft.commander.calm() is not None
+
+
 @settings(max_examples=12)
 @given(
     cuts_ms=st.lists(st.integers(1, 9000), max_size=6),
@@ -175,3 +194,43 @@ def test_however_a_flight_is_cut_into_calls_it_is_the_same(
     items = (UP, *(item(16, *point, hold_s, radius_m, 0.0, NAN) for point in points), DOWN)
     cuts: Script = [(1.0 + 2 * ms / 1000, lambda _: None) for ms in sorted(cuts_ms)]
     same("yawsitter-real", [*mission(*items), *cuts], 22.0, 1.0, seed=2, gust_m_s=0.3)
+
+
+PLACES = st.tuples(st.floats(-8, 8), st.floats(-8, 8), st.floats(-6, -0.3))
+ASKED: st.SearchStrategy[Request] = st.one_of(
+    st.sampled_from(
+        [
+            lambda v: v.commander.arm(),
+            lambda v: v.commander.takeoff(),
+            lambda v: v.commander.land(),
+            lambda v: v.commander.hold(),
+            lambda v: v.commander.return_home(),
+            lambda v: v.commander.disarm(),
+            lambda v: v.commander.disarm(force=True),
+            lambda v: v.commander.start_mission(),
+            lambda v: v.commander.set_home(None),
+            lambda v: v.commander.face((3.0, 3.0, 0.0)),
+            lambda v: v.mission.replace((UP, item(16, 2.0, 1.0, -3.0), item(93, 0, 0, 0, 0.5), DOWN)),
+            lambda v: v.mission.set_current(1),
+            lambda v: v.parameters.set("GF_MAX_HOR_DIST", 5.0),
+            lambda v: v.parameters.set("BAT_LOW_THR", 0.99),
+            lambda v: v.reset(),
+        ]
+    ),
+    PLACES.map(lambda place: lambda v: v.commander.guided.reposition(place, 0.5)),
+    PLACES.map(lambda place: lambda v: v.commander.guided.turns(place, 1.5, 0.5)),
+    PLACES.map(lambda place: lambda v: v.commander.guided.orbit(place, 2.0, None, Look.ALONG, 4.0)),
+    st.floats(0.5, 3.0).map(lambda speed: lambda v: v.commander.change_speed(speed)),
+)
+
+
+@settings(max_examples=40)
+@given(st.lists(st.tuples(st.integers(2, 600), ASKED), max_size=10), st.sampled_from(sorted(SPECS)), st.booleans())
+def test_whatever_is_asked_whenever_it_is_flown_the_same(
+    asked: list[tuple[int, Request]], vehicle: str, gusty: bool
+) -> None:
+    at_s, script = 0.02, [(0.02, lambda v: v.commander.takeoff()), (0.02, lambda v: v.commander.arm())]
+    for steps, request in asked:
+        at_s += steps * 0.002 * 5
+        script.append((at_s, request))
+    same(vehicle, script, at_s + 6.0, 1.0, seed=7, gust_m_s=0.5 if gusty else 0.0)
