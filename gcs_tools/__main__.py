@@ -29,6 +29,7 @@ examples:
 exit status: 0 done, 1 the vehicle refused or was lost, 2 the request itself can't be used, 130 interrupted.
 """
 
+_SIGNING = "sign with this key: 32 bytes, or 64 hexadecimal digits"
 MODES = ("position", "takeoff", "hold", "mission", "return", "land", "offboard")
 
 
@@ -126,9 +127,7 @@ def parser() -> argparse.ArgumentParser:
     )
     link.add_argument("--system", type=_system, metavar="ID", help="talk to this system id (the first one heard)")
 
-    link.add_argument(
-        "--signing-key", type=_key, metavar="FILE", help="sign with this key: 32 bytes, or 64 hexadecimal digits"
-    )
+    link.add_argument("--signing-key", type=_key, metavar="FILE", help=_SIGNING)
     link.add_argument(
         "--impair",
         type=_impairment,
@@ -244,6 +243,22 @@ def parser() -> argparse.ArgumentParser:
     )
     view.add_argument(
         "--instance", action="append", type=_instance, metavar="N", help="show this vehicle, may be repeated (0)"
+    )
+    view.add_argument(
+        "--mavlink",
+        type=_connection,
+        default="udpout:127.0.0.1:18570",
+        metavar="udpin|udpout:HOST:PORT",
+        help="where instance 0 is commanded; ports go up with the instances (udpout:127.0.0.1:18570)",
+    )
+    view.add_argument("--signing-key", type=_key, metavar="FILE", help=_SIGNING)
+    view.add_argument(
+        "--mission",
+        action="append",
+        type=Path,
+        default=[],
+        metavar="FILE",
+        help="offer this mission, beside those in missions/; may be repeated",
     )
     view.add_argument("--host", default="127.0.0.1", metavar="ADDRESS", help="serve here (127.0.0.1: this machine)")
     view.add_argument("--port", type=_port, default=8080, metavar="PORT", help="serve here (8080)")

@@ -60,7 +60,7 @@ class UdpLink:
 
     def __init__(self, connection: Connection, impairment: Impairment = GOOD) -> None:
         where = f"{connection.host}:{connection.port}"
-        self._peer: Address | None = None
+        self.peer: Address | None = None  # once called, or heard
         self._in: Wire[tuple[bytes, Address]]
         self._out: Wire[bytes]
         self._in, self._out = Wire(impairment), Wire(impairment.reversed())
@@ -71,7 +71,7 @@ class UdpLink:
             if connection.listens:
                 self._socket.bind((connection.host, connection.port))
             else:
-                self._peer = (socket.gethostbyname(connection.host), connection.port)
+                self.peer = (socket.gethostbyname(connection.host), connection.port)
         except OSError as error:
             self._socket.close()
             verb = "listen on" if connection.listens else "reach"
@@ -99,20 +99,20 @@ class UdpLink:
             self._in.put(now_s(), (data, address))
         for data, address in self._in.take(now_s()):
             if client.receive(data, now_s()):
-                self._peer = address
+                self.peer = address
 
     def flush(self, client: Client) -> None:
         """Send what the client has to say now. What nobody has been heard for is dropped."""
         for data in client.poll(now_s()):
             self._out.put(now_s(), data)
         for data in self._out.take(now_s()):
-            if self._peer is not None:
+            if self.peer is not None:
                 try:
-                    self._socket.sendto(data, self._peer)
+                    self._socket.sendto(data, self.peer)
                 except (BlockingIOError, ConnectionError):
                     continue
                 except OSError as error:
-                    where = f"{self._peer[0]}:{self._peer[1]}"
+                    where = f"{self.peer[0]}:{self.peer[1]}"
                     raise LinkError(f"can't send to {where}: {error.strerror or error}") from None
 
     def run(self, client: Client, each_turn: Callable[[float], None] = lambda _wall_s: None) -> None:

@@ -30,6 +30,11 @@ class Text(NamedTuple):
     severity: int
     text: str
 
+    @property
+    def introduces(self) -> bool:
+        """Whether the vehicle tells who it is, as it does to whom it doesn't know (any more)."""
+        return _ON_CONNECT.search(self.text) is not None
+
 
 class VehicleState:
     """The newest of everything heard. Each method named after a message takes that message in."""

@@ -21,13 +21,20 @@ def run(args: argparse.Namespace) -> None:
     """Raises ConfigError, KeyboardInterrupt."""
     _need("viser")
     from gcs_tools.view.page import Page
+    from gcs_tools.view.panels import Panels, missions_of
+    from gcs_tools.view.pilot_thread import Pilots
 
+    missions = missions_of(Path("missions"), args.mission)
     with contextlib.ExitStack() as stack:
         source = _recording(args.file) if args.file is not None else _live(args)
         stack.callback(source.close)
         server = open_server(args.host, args.port)
         stack.callback(server.stop)
         page = Page(server, source)
+        if page.live:
+            pilots = Pilots(args.mavlink, args.signing_key)
+            stack.callback(pilots.close)
+            Panels(page, pilots, missions)
         print(f"gcs view: http://{args.host}:{args.port}  {source.status.text}", flush=True)
         turn(page)
 
