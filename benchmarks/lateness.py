@@ -18,7 +18,7 @@ from benchmarks.figure import Figure, quantile, told
 from benchmarks.processes import BenchmarkError, free_instance, ground, listener, running, start
 from sitl.daemon import assembly
 from sitl.daemon.clock import TURN_S, Lateness
-from sitl.daemon.config import RunConfig
+from sitl.daemon.config import RunConfig, Setup
 from sitl.daemon.loop import Loop
 from sitl.daemon.main import wall_clock
 from sitl.daemon.recorder import Recorder
@@ -80,17 +80,17 @@ def _assembled(config: RunConfig) -> Iterator[Loop]:
     with contextlib.ExitStack() as stack:
         state = stack.enter_context(tempfile.TemporaryDirectory(prefix="yawsitter-benchmark-"))
         config = config._replace(state_dir=Path(state))
-        sockets = Sockets(config.local_ports, config.instance)
+        setup = Setup((config,))
+        sockets = Sockets(setup.sockets, config.instance)
         stack.callback(sockets.close)
-        publisher = assembly.open_publisher(config)
-        assert publisher is not None
-        stack.callback(publisher.close)
-        vehicle = assembly.build_vehicle(config)
+        built = assembly.build(setup)
+        stack.callback(built.close)
+        [vehicle] = built.vehicles
         recorder = None
         if config.record:
             recorder = Recorder(config.log_dir, config.instance)
             stack.callback(recorder.close)
-        loop, _ = assembly.build_loop(config, vehicle, sockets, publisher, recorder, clock)
+        loop = assembly.build_loop(setup, built.vehicles, sockets, built.publishers, recorder, clock)
         vehicle.advance(100_000)
         vehicle.commander.takeoff()
         vehicle.commander.arm()

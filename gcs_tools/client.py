@@ -63,6 +63,7 @@ class Client:
         self._parser = codec.Parser()
         self._out: list[bytes] = []
         self._script: Script[Any] | None = None
+        self.heartbeats = True  # said every second
         self._next_heartbeat_s = -math.inf
         self._wake_s = -math.inf
         self._acks: dict[int, Any] = {}
@@ -145,7 +146,8 @@ class Client:
             self._signer.keep_time(wall_s)
         if wall_s >= self._next_heartbeat_s:
             self._next_heartbeat_s = wall_s + HEARTBEAT_S
-            self.send(self._heartbeat)
+            if self.heartbeats:
+                self.send(self._heartbeat)
         wake_s = math.inf
         if self.background is not None:
             wake_s = self.background()

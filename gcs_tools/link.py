@@ -12,6 +12,7 @@ from types import TracebackType
 from typing import NamedTuple
 
 from gcs_tools.client import Client, LinkError
+from gcs_tools.fleet import Fleet
 from gcs_tools.impairment import GOOD, Impairment, Wire
 from sitl.mavlink.signing import Signer
 
@@ -56,7 +57,7 @@ def signer(key: bytes) -> Signer:
 
 
 class UdpLink:
-    """One socket between a Client and its vehicle, and what is to go wrong on the way."""
+    """One socket between a Client and its vehicle (or a Fleet and its), and what is to go wrong on the way."""
 
     def __init__(self, connection: Connection, impairment: Impairment = GOOD) -> None:
         where = f"{connection.host}:{connection.port}"
@@ -83,7 +84,7 @@ class UdpLink:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         self._socket.close()
 
-    def turn(self, client: Client) -> None:
+    def turn(self, client: Client | Fleet) -> None:
         """Send what the client has, wait for an arrival or its next deadline, hand over what has arrived."""
         self.flush(client)
         next_s = min(client.next_deadline, self._in.next_s, self._out.next_s)
@@ -101,7 +102,7 @@ class UdpLink:
             if client.receive(data, now_s()):
                 self.peer = address
 
-    def flush(self, client: Client) -> None:
+    def flush(self, client: Client | Fleet) -> None:
         """Send what the client has to say now. What nobody has been heard for is dropped."""
         for data in client.poll(now_s()):
             self._out.put(now_s(), data)
@@ -115,7 +116,7 @@ class UdpLink:
                     where = f"{self.peer[0]}:{self.peer[1]}"
                     raise LinkError(f"can't send to {where}: {error.strerror or error}") from None
 
-    def run(self, client: Client, each_turn: Callable[[float], None] = lambda _wall_s: None) -> None:
+    def run(self, client: Client | Fleet, each_turn: Callable[[float], None] = lambda _wall_s: None) -> None:
         """Until the client's script has ended, and what it sent last is on its way. Raises its fault."""
         while not client.finished:
             self.turn(client)

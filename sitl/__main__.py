@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NoReturn, TypeVar
 
 from sitl.campaign import options
-from sitl.daemon import config
+from sitl.daemon import config, swarm
 
 T = TypeVar("T")
 
@@ -52,6 +52,34 @@ While it runs, the parameters SIM_SPEED (0: as fast as possible), SIM_PAUSE and 
 while paused) change its pace, and SIM_WIND_N, SIM_WIND_E, SIM_WIND_D and SIM_GUST the air.
 
 exit status: 0 after Ctrl-C, SIGTERM or a shutdown command; 2 for settings that can't be used.
+"""
+
+SWARM = f"""\
+Run N vehicles in one process, on one clock, until Ctrl-C. Each is a MAVLink system as `sitl run` makes it: vehicle k
+has the ports, system id and state folder of instance I+k, and flies as it would alone with the same seed (S+k).
+
+  UDP 18300+I      all of them on one port, sending to 127.0.0.1:14550 from the start: a ground station there sees the
+                   whole swarm. What is sent to this port goes to the vehicle that it names, or to all if it names none
+  UDP 18570+I+k    vehicle k alone, for whoever calls
+  UDP 14580+I+k    vehicle k for onboard computers, heartbeating to 127.0.0.1:14540+I+k (14549 at most); streams to
+                   whoever answers
+  TCP 7447+I       one Zenoh session with the keys yawsitter/I/... to yawsitter/I+N-1/...
+
+{VEHICLES}"""
+
+SWARM_EXAMPLES = """\
+examples:
+  sitl swarm 9                                     nine vehicles on a grid, three metres apart
+  sitl swarm 50 --vehicle yawsitter-real --rate 5  fifty, with five messages a second of each stream
+  sitl swarm 9 --formation examples/formations/v.yaml
+  sitl swarm 4 --instance 20 --speed max --no-zenoh
+  gcs fly missions/rectangle.yaml --system 3       the third of them flies (in another terminal)
+  python examples/formation.py v                   all of them fly in formation
+
+SIM_SPEED, SIM_PAUSE and SIM_STEP_MS, set on any vehicle, change the pace of all. A vehicle that is told to reboot
+starts again by itself; one that is told to shut down is switched off while the others go on.
+
+exit status: 0 after Ctrl-C, SIGTERM or the last vehicle's shutdown; 2 for settings that can't be used.
 """
 
 FLY = f"""\
@@ -102,6 +130,7 @@ exit status: 0 when the report is written, 1 when a flight failed, 2 for setting
 """
 
 _HELP_RUN = "run a vehicle behind MAVLink and Zenoh, in real time or faster"
+_HELP_SWARM = "run many vehicles in one process, on one port and on ports of their own"
 _HELP_FLY = "fly a mission in one process and print the error table"
 _HELP_TRIM = "find hover or level-flight trim"
 _HELP_REPRODUCE = "fly the paper's evaluation and write a report"
@@ -184,6 +213,65 @@ def _add_simulation(parser: argparse.ArgumentParser, speed: str) -> None:
     )
 
 
+def _add_daemon(parser: argparse.ArgumentParser) -> None:
+    """What `sitl run` and `sitl swarm` have in common."""
+    _add_vehicle(parser)
+    parser.add_argument(
+        "--instance",
+        type=_reader(config.parse_instance),
+        default=0,
+        metavar="I",
+        help="its ports, system id and state folder; of a swarm the first vehicle's (0)",
+    )
+    _add_simulation(parser, "1")
+    parser.add_argument(
+        "--home",
+        type=_reader(config.parse_home),
+        metavar="LAT,LON,ALT,HDG",
+        help="where it stands: degrees, metres above mean sea level, degrees from north",
+    )
+    parser.add_argument(
+        "--identity",
+        choices=("px4", "generic"),
+        default="px4",
+        help="autopilot that it reports (px4): ground stations know px4's modes; generic claims none",
+    )
+    parser.add_argument(
+        "--gcs",
+        type=_reader(config.parse_peer),
+        default=[],
+        action="append",
+        metavar="HOST:PORT",
+        help="another ground station to serve from the start; may be given again",
+    )
+    parser.add_argument(
+        "--listen",
+        type=_reader(config.parse_listen),
+        default=config.LOOPBACK,
+        metavar="ADDRESS",
+        help="where the UDP ports listen (127.0.0.1); 0.0.0.0 lets everyone on the network command the vehicle",
+    )
+    parser.add_argument(
+        "--state-dir",
+        type=Path,
+        metavar="DIR",
+        help="parameters and plan are kept here ($XDG_STATE_HOME or ~/.local/state, yawsitter/instance-I)",
+    )
+    parser.add_argument("--no-zenoh", action="store_true", help="no Zenoh telemetry")
+    parser.add_argument(
+        "--zenoh-endpoint",
+        metavar="ENDPOINT",
+        help="where Zenoh listens (tcp/127.0.0.1:7447+I)",
+    )
+    parser.add_argument(
+        "--signing-key",
+        type=Path,
+        metavar="FILE",
+        help="sign every message and take none that isn't signed with this key: 32 bytes, or 64 hexadecimal digits",
+    )
+    parser.add_argument("--verbose", action="store_true", help="log more")
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="sitl",
@@ -205,64 +293,11 @@ def _parser() -> argparse.ArgumentParser:
         )
 
     run = command("run", _HELP_RUN, RUN, RUN_EXAMPLES)
-    _add_vehicle(run)
-    run.add_argument(
-        "--instance",
-        type=_reader(config.parse_instance),
-        default=0,
-        metavar="I",
-        help="its ports, system id and state folder (0)",
-    )
-    _add_simulation(run, "1")
-    run.add_argument(
-        "--home",
-        type=_reader(config.parse_home),
-        metavar="LAT,LON,ALT,HDG",
-        help="where it stands: degrees, metres above mean sea level, degrees from north",
-    )
-    run.add_argument(
-        "--identity",
-        choices=("px4", "generic"),
-        default="px4",
-        help="autopilot that it reports (px4): ground stations know px4's modes; generic claims none",
-    )
-    run.add_argument(
-        "--gcs",
-        type=_reader(config.parse_peer),
-        default=[],
-        action="append",
-        metavar="HOST:PORT",
-        help="another ground station to serve from the start; may be given again",
-    )
-    run.add_argument(
-        "--listen",
-        type=_reader(config.parse_listen),
-        default=config.LOOPBACK,
-        metavar="ADDRESS",
-        help="where the UDP ports listen (127.0.0.1); 0.0.0.0 lets everyone on the network command the vehicle",
-    )
-    run.add_argument(
-        "--state-dir",
-        type=Path,
-        metavar="DIR",
-        help="parameters and plan are kept here ($XDG_STATE_HOME or ~/.local/state, yawsitter/instance-I)",
-    )
-    run.add_argument("--no-zenoh", action="store_true", help="no Zenoh telemetry")
-    run.add_argument(
-        "--zenoh-endpoint",
-        metavar="ENDPOINT",
-        help="where Zenoh listens (tcp/127.0.0.1:7447+I)",
-    )
+    _add_daemon(run)
     run.add_argument(
         "--hil-viewer",
         action="store_true",
         help="send HEARTBEAT and HIL_STATE_QUATERNION (25 Hz, true state) to 127.0.0.1:19410+I for jMAVSim or Hawkeye",
-    )
-    run.add_argument(
-        "--signing-key",
-        type=Path,
-        metavar="FILE",
-        help="sign every message and take none that isn't signed with this key: 32 bytes, or 64 hexadecimal digits",
     )
     run.add_argument(
         "--forward", action="store_true", help="pass messages on between peers, as MAVLink's routing rules have it"
@@ -275,7 +310,29 @@ def _parser() -> argparse.ArgumentParser:
         metavar="DIR",
         help="keep each flight in DIR (logs in the state folder): MAVLink frames as .tlog, control steps as .mcap",
     )
-    run.add_argument("--verbose", action="store_true", help="log more")
+
+    flock = command("swarm", _HELP_SWARM, SWARM, SWARM_EXAMPLES)
+    flock.add_argument("count", type=_reader(swarm.parse_count), metavar="N", help="how many vehicles, up to 250")
+    _add_daemon(flock)
+    where = flock.add_mutually_exclusive_group()
+    where.add_argument(
+        "--spacing",
+        type=_reader(swarm.parse_spacing),
+        default=3.0,
+        metavar="M",
+        help="of the square grid on which they stand, its first corner at --home (3)",
+    )
+    where.add_argument("--formation", type=Path, metavar="FILE", help="where they stand: docs/swarm.md")
+    flock.add_argument(
+        "--rate",
+        type=_reader(swarm.parse_rate),
+        default=10.0,
+        metavar="HZ",
+        help="of each MAVLink stream that nobody asked for more of, at most, and SIM_TLM_RATE (10)",
+    )
+    flock.add_argument(
+        "--port", type=_reader(swarm.parse_port), metavar="PORT", help="the UDP port of all of them (18300+I)"
+    )
 
     fly = command("fly", _HELP_FLY, FLY, FLY_EXAMPLES)
     fly.add_argument("mission", type=Path, metavar="MISSION", help="a mission (.yaml) or QGroundControl plan (.plan)")
@@ -318,10 +375,9 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _run(args: argparse.Namespace) -> int:
-    from sitl.daemon import main as daemon
-
-    settings = config.RunConfig(
+def _daemon(args: argparse.Namespace) -> config.RunConfig:
+    """What `_add_daemon` has read."""
+    return config.RunConfig(
         vehicle=args.vehicle,
         instance=args.instance,
         speed=args.speed,
@@ -336,14 +392,32 @@ def _run(args: argparse.Namespace) -> int:
         state_dir=args.state_dir,
         zenoh_endpoint=args.zenoh_endpoint,
         zenoh=not args.no_zenoh,
+        listen=args.listen,
+        signing_key=args.signing_key,
+    )
+
+
+def _run(args: argparse.Namespace) -> int:
+    from sitl.daemon import main as daemon
+
+    settings = _daemon(args)._replace(
         record=args.record is not None,
         record_dir=None if args.record is _IN_STATE else args.record,
-        listen=args.listen,
         hil_viewer=args.hil_viewer,
-        signing_key=args.signing_key,
         forward=args.forward,
     )
-    return daemon.main(settings, verbose=args.verbose)
+    return daemon.main(config.Setup((settings,)), verbose=args.verbose)
+
+
+def _swarm(args: argparse.Namespace) -> int:
+    from sitl.daemon import main as daemon
+
+    places_m = swarm.grid(args.count, args.spacing)
+    if args.formation is not None:
+        from sitl.daemon import formation
+
+        places_m = formation.load(args.formation, args.count)
+    return daemon.main(swarm.setup(_daemon(args), places_m, args.rate, args.port), verbose=args.verbose)
 
 
 def _fly(args: argparse.Namespace) -> int:
@@ -380,7 +454,14 @@ def _is_mistake(error: ValueError) -> bool:
 
 def main(argv: Sequence[str] | None = None) -> int:
     args = _parser().parse_args(argv)
-    commands = {"run": _run, "fly": _fly, "trim": _trim, "reproduce": _reproduce, "campaign": _campaign}
+    commands = {
+        "run": _run,
+        "swarm": _swarm,
+        "fly": _fly,
+        "trim": _trim,
+        "reproduce": _reproduce,
+        "campaign": _campaign,
+    }
     try:
         return commands[args.command](args)
     except ValueError as error:

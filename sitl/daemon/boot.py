@@ -5,10 +5,11 @@ fraction of a second. Requests that arrive meanwhile are not kept, since acting 
 whoever sent them; clients repeat them.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Generic
 
-from sitl.daemon.config import Address, Port
-from sitl.daemon.udp import Sockets
+from sitl.daemon.config import Address
+from sitl.daemon.udp import Place, Sockets
 from sitl.mavlink.codec import Encoder
 from sitl.mavlink.identity import COMPONENT_ID, Identity, boot_heartbeat
 from sitl.mavlink.signing import SIGNATURE_BYTES, Signer, is_signed
@@ -25,40 +26,44 @@ def is_lone_heartbeat(data: bytes) -> bool:
     return data[7:10] == b"\0\0\0" and is_signed(data) == (len(data) > _HEARTBEAT_BYTES)
 
 
-class Boot:
-    """Heartbeats to the static peers and to whoever has written."""
+class Boot(Generic[Place]):
+    """Heartbeats to the static peers and to whoever has written. voices: the system ids that speak at each place."""
 
     def __init__(
         self,
-        sockets: Sockets,
+        sockets: Sockets[Place],
         identity: Identity,
-        system_id: int,
-        peers: Iterable[tuple[Port, Address]],
+        voices: Mapping[Place, Sequence[int]],
+        peers: Iterable[tuple[Place, Address]],
         signer: Signer | None = None,
     ) -> None:
-        self.heard: dict[tuple[Port, Address], bytes] = {}  # the last lone HEARTBEAT of each, for the vehicle to learn
+        self.heard: dict[tuple[Place, Address], bytes] = {}  # the last lone HEARTBEAT of each, for the vehicle to learn
         self._sockets = sockets
         self._message = boot_heartbeat(identity)
-        self._system_id = system_id
+        self._voices = voices
         self._signer = signer
-        self._encoders = {peer: Encoder(system_id, COMPONENT_ID, signer) for peer in peers}
+        self._encoders = {peer: self._made(peer) for peer in peers}
         self._due_s = float("-inf")
+
+    def _made(self, peer: tuple[Place, Address]) -> list[Encoder]:
+        return [Encoder(system, COMPONENT_ID, self._signer) for system in self._voices[peer[0]]]
 
     def turn(self, wall_s: float) -> None:
         """Read what is there; heartbeat to everyone when it is time, and at once to a newcomer."""
         if self._signer is not None:
             self._signer.keep_time(wall_s)
-        for port, address, data in self._sockets.receive():
+        for place, address, data in self._sockets.receive():
             if not is_lone_heartbeat(data) or len(self.heard) >= HEARD_MAX:
                 continue
-            self.heard[port, address] = data
-            if (port, address) not in self._encoders:
-                self._encoders[port, address] = Encoder(self._system_id, COMPONENT_ID, self._signer)
-                self._send((port, address))
+            self.heard[place, address] = data
+            if (place, address) not in self._encoders:
+                self._encoders[place, address] = self._made((place, address))
+                self._send((place, address))
         if wall_s >= self._due_s:
             self._due_s = wall_s + HEARTBEAT_S
             for peer in self._encoders:
                 self._send(peer)
 
-    def _send(self, peer: tuple[Port, Address]) -> None:
-        self._sockets.send(*peer, self._encoders[peer].encode(self._message))
+    def _send(self, peer: tuple[Place, Address]) -> None:
+        for encoder in self._encoders[peer]:
+            self._sockets.send(*peer, encoder.encode(self._message))

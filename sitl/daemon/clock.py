@@ -9,6 +9,7 @@ import math
 from typing import Protocol
 
 TURN_S = 0.004  # wall time between the loop's turns: 250 Hz serves 100 Hz streams and 50 Hz targets without haste
+SWARM_TURN_S = 0.02  # of many vehicles, whose streams are slower: one slice a turn
 PAUSED_TURN_S = 0.02  # nothing moves; datagrams wake the loop anyway
 SLICE_US = 20_000  # simulation between two looks at the link: the commander's period
 LAG_MAX_S = 0.25  # wall time that is caught up at most; what is beyond is given up, not raced after
@@ -25,8 +26,9 @@ class Pacer(Protocol):
 class Scaled:
     """Simulation time = anchor + speed × wall time since the anchor, in turns on an absolute grid of wall time."""
 
-    def __init__(self, speed: float, now_us: int, wall_s: float) -> None:
+    def __init__(self, speed: float, now_us: int, wall_s: float, turn_s: float = TURN_S) -> None:
         self.speed = speed
+        self._turn_s = turn_s
         self.slipped_s = 0.0  # wall time given up because the machine could not keep pace
         self._origin_s = wall_s  # of the grid of turns
         self._anchor_us = now_us
@@ -42,7 +44,7 @@ class Scaled:
         return due
 
     def wake_s(self, wall_s: float) -> float:
-        return self._origin_s + (math.floor((wall_s - self._origin_s) / TURN_S + 1e-6) + 1) * TURN_S
+        return self._origin_s + (math.floor((wall_s - self._origin_s) / self._turn_s + 1e-6) + 1) * self._turn_s
 
 
 class Unbounded:
@@ -78,10 +80,10 @@ class Paused:
 class Pacing:
     """The pacer in force. `set` follows the parameters SIM_SPEED (0: as fast as possible), SIM_PAUSE, SIM_STEP_MS."""
 
-    def __init__(self, step_us: int, now_us: int, wall_s: float) -> None:
-        self._step_us = step_us
+    def __init__(self, step_us: int, now_us: int, wall_s: float, turn_s: float = TURN_S) -> None:
+        self._step_us, self._turn_s = step_us, turn_s
         self._slipped_before_s = 0.0
-        self._pacer: Scaled | Unbounded | Paused = Scaled(1.0, now_us, wall_s)
+        self._pacer: Scaled | Unbounded | Paused = Scaled(1.0, now_us, wall_s, turn_s)
 
     def set(self, speed: float, paused: bool, step_ms: int, now_us: int, wall_s: float) -> None:
         """Take new settings; the same ones again change nothing. `step_ms` counts only while paused."""
@@ -93,7 +95,7 @@ class Pacing:
             if not isinstance(pacer, Unbounded):
                 self._use(Unbounded())
         elif not isinstance(pacer, Scaled) or pacer.speed != speed:
-            self._use(Scaled(speed, now_us, wall_s))
+            self._use(Scaled(speed, now_us, wall_s, self._turn_s))
         if isinstance(self._pacer, Paused) and step_ms > 0 and not self._pacer.stepping(now_us):
             self._pacer.step(now_us, step_ms)
 
@@ -125,7 +127,8 @@ class Pacing:
 class Lateness:
     """How punctual the turns were: an overrun is a turn that began more than a whole turn late."""
 
-    def __init__(self) -> None:
+    def __init__(self, turn_s: float = TURN_S) -> None:
+        self.turn_s = turn_s
         self.turns = 0
         self.overruns = 0
         self.worst_s = 0.0
@@ -135,5 +138,5 @@ class Lateness:
         self.turns += 1
         if late > self.worst_s:
             self.worst_s = late
-        if late > TURN_S:
+        if late > self.turn_s:
             self.overruns += 1

@@ -11,6 +11,7 @@ from typing import NamedTuple
 from sitl.geodesy import GeoPoint
 
 INSTANCE_MAX = 249  # system id = instance + 1, and MAVLink's end at 255 with 251..255 for ground stations
+SHARED_PORT = 18300  # plus the first instance: where all vehicles of a swarm are spoken to
 GCS_PORT = 18570  # local ports of instance 0, and the peers they serve from the start
 GCS_PEER_PORT = 14550
 ONBOARD_PORT = 14580
@@ -24,6 +25,7 @@ GUST_MAX_M_S = 10.0
 SPEED_MAX = 1000.0
 
 Address = tuple[str, int]
+Place = tuple[int, "Port"]  # one of the sockets: the port of this instance
 
 
 class Port(Enum):
@@ -32,6 +34,7 @@ class Port(Enum):
     GCS = "gcs"
     ONBOARD = "onboard"
     VIEWER = "viewer"
+    SHARED = "shared"
 
 
 class SettingError(ValueError):
@@ -64,6 +67,8 @@ class RunConfig(NamedTuple):
     hil_viewer: bool = False
     signing_key: Path | None = None  # the file
     forward: bool = False
+    place_N_m: tuple[float, float] = (0.0, 0.0)  # where it stands, north and east of `home`
+    swarming: bool = False  # ground stations are served over the port that it shares
 
     @property
     def system_id(self) -> int:
@@ -84,16 +89,72 @@ class RunConfig(NamedTuple):
         return {port: (self.listen, number + self.instance) for port, number in ports.items()}
 
     @property
+    def ground_peers(self) -> tuple[Address, ...]:
+        """The ground stations among them."""
+        return tuple(dict.fromkeys(((LOOPBACK, GCS_PEER_PORT), *self.ground_stations)))
+
+    @property
     def static_peers(self) -> dict[Port, tuple[Address, ...]]:
         """Who is served whether or not it was heard."""
         onboard = min(ONBOARD_PEER_PORT + self.instance, ONBOARD_PEER_LAST)
         peers = {
-            Port.GCS: tuple(dict.fromkeys(((LOOPBACK, GCS_PEER_PORT), *self.ground_stations))),
+            Port.SHARED if self.swarming else Port.GCS: self.ground_peers,
             Port.ONBOARD: ((LOOPBACK, onboard),),
         }
         if self.hil_viewer:
             peers[Port.VIEWER] = ((LOOPBACK, VIEWER_PEER_PORT + self.instance),)
         return peers
+
+
+class Setup(NamedTuple):
+    """Everything that one process runs: a vehicle, or several with a port that they share."""
+
+    vehicles: tuple[RunConfig, ...]
+    shared: Address | None = None  # where that port listens
+    rate_max_Hz: float = math.inf  # of a stream that nobody asked for
+
+    @property
+    def first(self) -> RunConfig:
+        return self.vehicles[0]
+
+    @property
+    def shared_place(self) -> "Place":
+        return self.first.instance, Port.SHARED
+
+    @property
+    def sockets(self) -> "dict[Place, Address]":
+        """What to listen on."""
+        own = {(v.instance, port): address for v in self.vehicles for port, address in v.local_ports.items()}
+        return own if self.shared is None else {**own, self.shared_place: self.shared}
+
+    @property
+    def voices(self) -> "dict[Place, tuple[int, ...]]":
+        """The system ids that speak there."""
+        voices: dict[Place, tuple[int, ...]]
+        voices = {(v.instance, port): (v.system_id,) for v in self.vehicles for port in v.local_ports}
+        if self.shared is not None:
+            voices[self.shared_place] = tuple(v.system_id for v in self.vehicles)
+        return voices
+
+    @property
+    def static_peers(self) -> "list[tuple[Place, Address]]":
+        """Who is served there whether or not it was heard."""
+        peers = [
+            (self.place(v, port), address)
+            for v in self.vehicles
+            for port, addresses in v.static_peers.items()
+            for address in addresses
+        ]
+        return list(dict.fromkeys(peers))
+
+    def place(self, vehicle: RunConfig, port: Port) -> "Place":
+        """Which socket is that vehicle's port."""
+        return self.shared_place if port is Port.SHARED else (vehicle.instance, port)
+
+    def resolved(self) -> "Setup":
+        """With a state folder for each vehicle."""
+        vehicles = (v._replace(state_dir=v.state_dir or default_state_dir(v.instance)) for v in self.vehicles)
+        return self._replace(vehicles=tuple(vehicles))
 
 
 def default_state_dir(instance: int) -> Path:

@@ -1,4 +1,4 @@
-"""`sitl run`: sockets and boot heartbeats first, then the vehicle, then the loop until the end."""
+"""`sitl run` and `sitl swarm`: sockets and boot heartbeats first, then the vehicles, then the loop until the end."""
 
 import logging
 import os
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from sitl.daemon import config as settings
 from sitl.daemon.boot import Boot
-from sitl.daemon.config import RunConfig, SettingError
+from sitl.daemon.config import Place, RunConfig, SettingError, Setup
 from sitl.daemon.lock import StateLock
 from sitl.daemon.recorder import Recorder
 from sitl.daemon.udp import Sockets
@@ -22,8 +22,7 @@ from sitl.mavlink.signing import KeyFileError, Signer, after_restart, read_key
 from sitl.onboard.store import FolderStore, Store
 
 if TYPE_CHECKING:
-    from sitl.telemetry.publisher import Publisher
-    from sitl.vehicle import Vehicle
+    from sitl.daemon.assembly import Built
 
 log = logging.getLogger("sitl")
 
@@ -56,21 +55,19 @@ class Stop:
 
 
 class Construction(threading.Thread):
-    """Imports and builds the vehicle while the main thread keeps up the heartbeats."""
+    """Imports and builds the vehicles while the main thread keeps up the heartbeats."""
 
-    def __init__(self, config: RunConfig) -> None:
+    def __init__(self, setup: Setup) -> None:
         super().__init__(name="construction", daemon=True)
-        self.vehicle: Vehicle | None = None
-        self.publisher: Publisher | None = None
+        self.built: Built | None = None
         self.failure: BaseException | None = None
-        self._config = config
+        self._setup = setup
 
     def run(self) -> None:
         try:
             from sitl.daemon import assembly
 
-            self.publisher = assembly.open_publisher(self._config)
-            self.vehicle = assembly.build_vehicle(self._config)
+            self.built = assembly.build(self._setup)
         except BaseException as failure:
             self.failure = failure
 
@@ -103,26 +100,28 @@ def _signer(config: RunConfig, store: Store) -> Signer | None:
     return Signer(key, after_restart(int(saved)) if saved.strip().isdigit() else 0, save)
 
 
-def main(config: RunConfig, verbose: bool = False) -> int:
+def main(setup: Setup, verbose: bool = False) -> int:
     """Run until told to stop; returns the exit status. Raises SettingError for settings that can't be used."""
     logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", level=logging.INFO, stream=sys.stderr)
     if verbose:
         log.setLevel(logging.DEBUG)
-    config = settings.check(config)._replace(state_dir=config.state_dir or settings.default_state_dir(config.instance))
+    config = settings.check(setup.first)
+    setup = setup.resolved()
     stop = Stop()
     clock = wall_clock()
-    assert config.state_dir is not None
-    signer = _signer(config, FolderStore(config.state_dir))
-    sockets = Sockets(config.local_ports, config.instance)
-    peers = [(port, address) for port, addresses in config.static_peers.items() for address in addresses]
-    boot = Boot(sockets, Identity(config.identity), config.system_id, peers, signer)
+    folders = [vehicle.state_dir for vehicle in setup.vehicles if vehicle.state_dir is not None]
+    signer = _signer(config, FolderStore(folders[0]))
+    sockets: Sockets[Place] = Sockets(setup.sockets, config.instance)
+    boot: Boot[Place] = Boot(sockets, Identity(config.identity), setup.voices, setup.static_peers, signer)
     boot.turn(clock())
-    recorder = lock = None
-    construction = Construction(config)
+    recorder = None
+    locks: list[StateLock] = []
+    construction = Construction(setup)
     try:
-        lock = _locked(config.state_dir)
+        for folder in folders:
+            locks.append(_locked(folder))
         if config.record:
-            recorder = Recorder(config.log_dir, config.instance)
+            recorder = Recorder(setup.first.log_dir, config.instance)
         construction.start()
         while construction.is_alive() and not stop():
             boot.turn(clock())
@@ -133,39 +132,38 @@ def main(config: RunConfig, verbose: bool = False) -> int:
             os._exit(0)
         if construction.failure is not None:
             raise construction.failure
-        assert construction.vehicle is not None
-        _fly(config, construction.vehicle, construction.publisher, sockets, recorder, boot, stop, clock, signer)
+        assert construction.built is not None
+        _fly(setup, construction.built, sockets, recorder, boot, stop, clock, signer)
     finally:
-        if construction.publisher is not None:
-            construction.publisher.close()
+        if construction.built is not None:
+            construction.built.close()
         if recorder is not None:
             recorder.close()
-        if lock is not None:
+        for lock in locks:
             lock.close()
         sockets.close()
     return 0
 
 
 def _fly(
-    config: RunConfig,
-    vehicle: "Vehicle",
-    publisher: "Publisher | None",
-    sockets: Sockets,
+    setup: Setup,
+    built: "Built",
+    sockets: Sockets[Place],
     recorder: Recorder | None,
-    boot: Boot,
+    boot: Boot[Place],
     stop: Stop,
     clock: Callable[[], float],
     signer: Signer | None,
 ) -> None:
-    """The loop, again for each reboot, until it ends."""
+    """The loop, again for each reboot of a lone vehicle, until it ends."""
     from sitl.daemon import assembly
     from sitl.daemon.loop import Ending
 
-    log.info("%s", assembly.banner(config, vehicle, publisher, recorder))
+    vehicles = built.vehicles
+    log.info("%s", assembly.banner(setup, vehicles[0], built.session is not None, recorder))
     while True:
-        loop, endpoint = assembly.build_loop(config, vehicle, sockets, publisher, recorder, clock, signer)
-        assembly.introduce(endpoint, boot, clock())
-        boot.heard.clear()
+        loop = assembly.build_loop(setup, vehicles, sockets, built.publishers, recorder, clock, signer)
+        assembly.introduce(loop, boot, clock())
         assembly.settle_garbage()
         ending = loop.run(stop)
         figures = loop.figures()
@@ -180,4 +178,4 @@ def _fly(
         )
         if ending is not Ending.REBOOT:
             return
-        vehicle = assembly.build_vehicle(config)
+        vehicles = [assembly.build_vehicle(setup.first)]

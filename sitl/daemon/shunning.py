@@ -8,9 +8,10 @@ import contextlib
 import logging
 import socket
 import sys
-from typing import NamedTuple
+from collections.abc import Hashable
+from typing import Generic, NamedTuple, TypeVar
 
-from sitl.daemon.config import Address, Port
+from sitl.daemon.config import Address
 
 SHUN_S = 2.0  # how long an address is not listened to
 REFUSALS = 500  # datagrams refused within a second that earn it that
@@ -20,27 +21,29 @@ TOLD_S = 10.0  # between two lines in the log
 
 log = logging.getLogger(__name__)
 
+Place = TypeVar("Place", bound=Hashable)  # which of the daemon's sockets
+
 
 class _Sink(NamedTuple):
     until_s: float
     socket: socket.socket
 
 
-class Shunning:
+class Shunning(Generic[Place]):
     """Counts refusals by address. `shunned`: how often an address has been shut out."""
 
     def __init__(self) -> None:
         self.shunned = 0
-        self._refusals: dict[tuple[Port, Address], int] = {}
+        self._refusals: dict[tuple[Place, Address], int] = {}
         self._since_s = self._told_s = float("-inf")
-        self._sinks: dict[tuple[Port, Address], _Sink] = {}
+        self._sinks: dict[tuple[Place, Address], _Sink] = {}
 
-    def refused(self, listening: socket.socket, port: Port, address: Address, wall_s: float) -> None:
+    def refused(self, listening: socket.socket, place: Place, address: Address, wall_s: float) -> None:
         """A datagram from `address` to `listening` was more than it may send."""
         if wall_s - self._since_s > 1.0:
             self._refusals.clear()
             self._since_s = wall_s
-        sender = port, address
+        sender = place, address
         count = self._refusals.get(sender, 0) + 1
         if count > 1 or len(self._refusals) < COUNTED_MAX:
             self._refusals[sender] = count
@@ -57,7 +60,7 @@ class Shunning:
     def close(self) -> None:
         self.pardon(float("inf"))
 
-    def _shun(self, listening: socket.socket, sender: tuple[Port, Address], wall_s: float) -> None:
+    def _shun(self, listening: socket.socket, sender: tuple[Place, Address], wall_s: float) -> None:
         if sys.platform != "linux":
             return
         sink = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)

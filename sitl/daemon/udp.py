@@ -1,36 +1,49 @@
-"""The UDP sockets of a vehicle: for ground stations, for onboard computers, for viewers. Never blocks but in `wait`."""
+"""The daemon's UDP sockets: of each vehicle for ground stations, onboard computers and viewers, and shared ones.
+
+Never blocks but in `wait`. One selector holds them all, so that looking at a hundred of them costs what is there.
+"""
 
 import contextlib
 import errno
 import select
+import selectors
 import socket
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Hashable, Iterator, Mapping
+from typing import Any, Generic, TypeVar
 
-from sitl.daemon.config import Address, Port, SettingError
+from sitl.daemon.config import Address, SettingError
 from sitl.daemon.shunning import Shunning
 
 DATAGRAMS_AT_ONCE = 256  # per socket; the loop looks at its deadline before it takes more
 _BUFFER_BYTES = 1 << 20
 _DATAGRAM_BYTES = 65535
 
+Place = TypeVar("Place", bound=Hashable)  # which of the daemon's sockets
 
-class Sockets:
-    """Bound sockets, each under whom it is for."""
 
-    def __init__(self, addresses: Mapping[Port, Address], instance: int) -> None:
+class Sockets(Generic[Place]):
+    """Bound sockets, each under its place. instance: the first whose ports they are, named where one is in use."""
+
+    def __init__(self, addresses: Mapping[Place, Address], instance: int) -> None:
         self.received = 0
         self.sent = 0
         self.dropped = 0  # datagrams that the system would not take
-        self._shunning = Shunning()
-        self._sockets: dict[Port, socket.socket] = {}
+        self._shunning: Shunning[Place] = Shunning()
+        self._sockets: dict[Place, socket.socket] = {}
+        self._selector = selectors.DefaultSelector()
         try:
-            for port, address in addresses.items():
-                self._sockets[port] = _bound(address, instance)
+            for place, address in addresses.items():
+                sock = self._sockets[place] = _bound(address, instance)
+                self._selector.register(sock, selectors.EVENT_READ, place)
         except SettingError:
             self.close()
             raise
-        self._readable = list(self._sockets.values())
+        # epoll and kqueue can be waited for themselves, and by select to the microsecond; epoll by itself to the next
+        # whole millisecond
+        self._readable: list[Any] = list(self._sockets.values())
+        if hasattr(self._selector, "fileno"):
+            self._readable = [self._selector]
 
     def wait(self, timeout_s: float) -> bool:
         """Sleep until a datagram is there (True) or the time is over (False)."""
@@ -40,12 +53,12 @@ class Sockets:
         """Sleep, whatever arrives."""
         time.sleep(max(0.0, seconds))
 
-    def receive(self) -> Iterator[tuple[Port, Address, bytes]]:
+    def receive(self) -> Iterator[tuple[Place, Address, bytes]]:
         """What has come in, without waiting, from each socket in turn: the caller may stop before all is read."""
-        waiting = list(self._sockets.items())
+        waiting = [(key.data, self._sockets[key.data]) for key, _ in self._selector.select(0.0)]
         for _ in range(DATAGRAMS_AT_ONCE):
             for entry in tuple(waiting):
-                port, sock = entry
+                place, sock = entry
                 try:
                     data, address = sock.recvfrom(_DATAGRAM_BYTES)
                 except BlockingIOError:
@@ -54,7 +67,7 @@ class Sockets:
                 except OSError:
                     continue  # Windows reports a peer's closed port here; nothing was received
                 self.received += 1
-                yield port, address, data
+                yield place, address, data
             if not waiting:
                 return
 
@@ -63,24 +76,25 @@ class Sockets:
         """How often a flooding address has been shut out."""
         return self._shunning.shunned
 
-    def refused(self, port: Port, address: Address, wall_s: float) -> None:
+    def refused(self, place: Place, address: Address, wall_s: float) -> None:
         """A datagram was more than its sender may send: too many of these, and the system drops the rest."""
-        self._shunning.refused(self._sockets[port], port, address, wall_s)
+        self._shunning.refused(self._sockets[place], place, address, wall_s)
 
     def pardon(self, wall_s: float) -> None:
         """Listen again to those that were shut out long enough."""
         self._shunning.pardon(wall_s)
 
-    def send(self, port: Port, address: Address, data: bytes) -> None:
+    def send(self, place: Place, address: Address, data: bytes) -> None:
         """Hand a datagram to the system; one that it refuses is counted and forgotten, as on any UDP link."""
         try:
-            self._sockets[port].sendto(data, address)
+            self._sockets[place].sendto(data, address)
             self.sent += 1
         except OSError:
             self.dropped += 1
 
     def close(self) -> None:
         self._shunning.close()
+        self._selector.close()
         for sock in self._sockets.values():
             with contextlib.suppress(OSError):
                 sock.close()

@@ -24,7 +24,7 @@ from sitl.mavlink.peers import Address, Peer, PortKind
 from sitl.mavlink.requests import on_request_data_stream, vehicle_heartbeat
 from sitl.mavlink.routing import Router, target_places
 from sitl.mavlink.signing import Signer, is_signed
-from sitl.mavlink.streams import NEVER, STREAMS
+from sitl.mavlink.streams import FULL, NEVER, STREAMS, Profile
 from sitl.onboard.modes import Severity
 from sitl.onboard.plan import Plan
 from sitl.onboard.plans import Plans
@@ -49,7 +49,7 @@ class Endpoint:
     system_id: MAVLink system (instance + 1); the component is the autopilot's. static_peers: served without being
     heard. logs, scratch: the recorded flights, and what clients may write (None: in memory). on_frame: sees the bytes
     of every frame, in and out (what goes to all peers alike: once). limits: what peers may send. signer: signs what
-    goes out, and what comes in must be signed. forward: pass messages on between peers.
+    goes out, and what comes in must be signed. forward: pass messages on between peers. profile: of the streams.
     """
 
     def __init__(
@@ -64,8 +64,9 @@ class Endpoint:
         limits: Limits = UNLIMITED,
         signer: Signer | None = None,
         forward: bool = False,
+        profile: Profile = FULL,
     ) -> None:
-        link = self._link = Link(vehicle, identity, system_id, static_peers, limits, signer)
+        link = self._link = Link(vehicle, identity, system_id, static_peers, limits, signer, profile)
         self._vehicle = vehicle
         self._parameters = ParameterService(link)
         self._missions = MissionService(link, _stores(vehicle.plans))
@@ -168,24 +169,53 @@ class Endpoint:
                 self.unauthentic += 1
                 continue
             if peer is None:
-                peer = link.peers.learn(kind, address, wall_s, self._vehicle.now_us)
+                peer = self._learn(address, kind)
                 if peer is None:
-                    self.refused += 1
                     return False
                 peer.parser = parser
-                self._stream_due_us = 0
-            if peer.hear(frame.version, wall_s):
-                self._greet(peer)
-            if link.on_frame is not None and frame.id != _SETUP_SIGNING:
-                link.on_frame(frame.raw, False)
-            if self._router is not None:
-                self._router.take(peer, frame)
-            try:
-                self._dispatch(peer, frame)
-            except Exception:
-                self.faults += 1
-                log.exception("handling %s failed", frame.name)
+            self._take(peer, frame)
         return True
+
+    def meet(self, address: Address, kind: PortKind, version: int, wall_s: float) -> "Peer | None":
+        """Somebody speaks at a port that this vehicle shares: serve them. None where there are too many already."""
+        self._link.wall_s = wall_s
+        peer = self._link.peers.find(kind, address) or self._learn(address, kind)
+        if peer is not None:
+            self._hear(peer, version)
+        return peer
+
+    def take(self, frame: Frame, address: Address, kind: PortKind, wall_s: float) -> None:
+        """A frame that came to a port that this vehicle shares, paid for and found authentic there. Never raises."""
+        self._link.wall_s = wall_s
+        if self._link.silent:
+            return
+        peer = self._link.peers.find(kind, address) or self._learn(address, kind)
+        if peer is not None:
+            self._take(peer, frame)
+
+    def _learn(self, address: Address, kind: PortKind) -> "Peer | None":
+        peer = self._link.peers.learn(kind, address, self._link.wall_s, self._vehicle.now_us)
+        if peer is None:
+            self.refused += 1
+        return peer
+
+    def _hear(self, peer: Peer, version: int) -> None:
+        if peer.hear(version, self._link.wall_s):
+            self._stream_due_us = 0
+            self._greet(peer)
+
+    def _take(self, peer: Peer, frame: Frame) -> None:
+        link = self._link
+        self._hear(peer, frame.version)
+        if link.on_frame is not None and frame.id != _SETUP_SIGNING:
+            link.on_frame(frame.raw, False)
+        if self._router is not None:
+            self._router.take(peer, frame)
+        try:
+            self._dispatch(peer, frame)
+        except Exception:
+            self.faults += 1
+            log.exception("handling %s failed", frame.name)
 
     def _is_authentic(self, signer: Signer, frame: Frame) -> bool:
         signer.keep_time(self._link.wall_s)
@@ -275,6 +305,8 @@ class Endpoint:
         self._streamed_us = now_us
         next_us = NEVER
         for peer in link.peers:
+            if not peer.streams:
+                continue
             schedule = peer.schedule
             if schedule.next_us <= now_us:
                 self._send_streams(peer, schedule.take(now_us))
@@ -345,6 +377,10 @@ class Endpoint:
     def takes(self) -> tuple[str, ...]:
         """Names of the messages that it acts on."""
         return tuple(by_id(identity).name for identity in self._handlers)
+
+    @property
+    def system_id(self) -> int:
+        return self._link.system_id
 
     @property
     def shutdown_requested(self) -> bool:

@@ -26,6 +26,14 @@ DAEMON = Limits(4000.0, 1000.0, 200.0, 100.0, 8000.0, 2000.0)
 80 × real time."""
 
 
+def shared(limits: Limits, vehicles: int) -> Limits:
+    """The same for a port that so many vehicles share: 100 frames a second more for each of them.
+
+    A broadcast counts once for each vehicle that gets it.
+    """
+    return limits._replace(peer_Hz=limits.peer_Hz + 100.0 * vehicles, peer_burst=limits.peer_burst + 100.0 * vehicles)
+
+
 class Allowance:
     """A token bucket on wall time."""
 

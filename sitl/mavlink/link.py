@@ -10,6 +10,7 @@ from sitl.mavlink.limits import Limits
 from sitl.mavlink.metadata import Metadata
 from sitl.mavlink.peers import Address, Peer, Peers, PortKind
 from sitl.mavlink.signing import Signer
+from sitl.mavlink.streams import FULL, Profile
 from sitl.mavlink.view import Craft, View
 from sitl.onboard.modes import Severity
 
@@ -41,6 +42,7 @@ class Link:
         static_peers: Iterable[tuple[PortKind, Address]],
         limits: Limits,
         signer: Signer | None,
+        profile: Profile = FULL,
     ) -> None:
         self.vehicle = vehicle
         self.identity = identity
@@ -49,7 +51,7 @@ class Link:
         self.wall_s = 0.0
         self.limits = limits
         self.signer = signer
-        self.peers = Peers(system_id, static_peers, vehicle.now_us, limits, signer)
+        self.peers = Peers(system_id, static_peers, vehicle.now_us, limits, signer, profile)
         self.on_frame: Callable[[bytes, bool], None] | None = None
         self.shutdown_requested = False
         self.reboot_requested = False

@@ -13,7 +13,7 @@ from sitl.mavlink.identity import COMPONENT_ID
 from sitl.mavlink.limits import Allowance, Limits
 from sitl.mavlink.parameters import Listing
 from sitl.mavlink.signing import Signer
-from sitl.mavlink.streams import PortKind, Schedule
+from sitl.mavlink.streams import FULL, PortKind, Profile, Schedule
 
 __all__ = ["Address", "Peer", "Peers", "PortKind"]
 
@@ -31,13 +31,22 @@ class Peer:
     """One address at one port."""
 
     def __init__(
-        self, kind: PortKind, address: Address, encoder: Encoder, limits: Limits, now_us: int, *, static: bool = False
+        self,
+        kind: PortKind,
+        address: Address,
+        encoder: Encoder,
+        limits: Limits,
+        now_us: int,
+        *,
+        static: bool = False,
+        profile: Profile = FULL,
     ) -> None:
         self.kind = kind
         self.address = address
         self.static = static
         self.encoder = encoder
         self.allowance = Allowance(limits.peer_Hz, limits.peer_burst)
+        self._profile = profile
         self.reset(now_us)
 
     def reset(self, now_us: int) -> None:
@@ -46,7 +55,8 @@ class Peer:
         self.encoder.version = 2
         self.speaks_v2 = False
         self.parser = Parser()
-        self.schedule = Schedule(self.kind, now_us)
+        self.streams = not self.static or self.kind not in self._profile.on_hearing
+        self.schedule = Schedule(self.kind, now_us, self._profile.rate_max_Hz)
         self.listing = Listing()
         self.answers = Answers()
         self.routes: set[tuple[int, int]] = set()  # systems and components behind this address
@@ -56,6 +66,7 @@ class Peer:
         """Note a sound frame in `version` of the framing; True if it is the first one."""
         first = self.heard_s is None
         self.heard_s = wall_s
+        self.streams = True
         if version == 2:
             self.speaks_v2 = True
         self.encoder.version = 2 if self.speaks_v2 or self.encoder.signer is not None else 1
@@ -72,15 +83,17 @@ class Peers:
         now_us: int,
         limits: Limits,
         signer: Signer | None,
+        profile: Profile = FULL,
     ) -> None:
-        self._system_id, self._limits, self._signer = system_id, limits, signer
+        self._system_id, self._limits, self._signer, self._profile = system_id, limits, signer, profile
         self._peers: dict[tuple[PortKind, Address], Peer] = {}
         for kind, address in static:
             self._add(kind, address, now_us, static=True)
 
     def _add(self, kind: PortKind, address: Address, now_us: int, *, static: bool = False) -> Peer:
         encoder = Encoder(self._system_id, COMPONENT_ID, self._signer, _LINK_NUMBERS[kind])
-        peer = self._peers[kind, address] = Peer(kind, address, encoder, self._limits, now_us, static=static)
+        peer = Peer(kind, address, encoder, self._limits, now_us, static=static, profile=self._profile)
+        self._peers[kind, address] = peer
         return peer
 
     def __iter__(self) -> Iterator[Peer]:

@@ -6,6 +6,7 @@ REQUEST_DATA_STREAM) is kept in its Schedule.
 """
 
 import heapq
+import math
 import struct
 from collections.abc import Callable, Mapping
 from enum import Enum
@@ -27,6 +28,17 @@ class PortKind(Enum):
     GCS = "gcs"
     ONBOARD = "onboard"
     VIEWER = "viewer"  # of the true state, for programs that only draw
+    SHARED = "shared"  # of all vehicles of a swarm, for ground stations
+
+
+class Profile(NamedTuple):
+    """How the default rates are cut where many vehicles share a machine; what a peer asks for is not."""
+
+    rate_max_Hz: float = math.inf  # of one stream
+    on_hearing: tuple[PortKind, ...] = ()  # ports whose peers get streams only once they have been heard
+
+
+FULL = Profile()
 
 
 class Stream(NamedTuple):
@@ -48,7 +60,7 @@ class Stream(NamedTuple):
 def _stream(
     name: str, gcs_Hz: float, onboard_Hz: float, values: Callable[[View], messages.Values | None] | None = None
 ) -> Stream:
-    rates_Hz = {PortKind.GCS: gcs_Hz, PortKind.ONBOARD: onboard_Hz}
+    rates_Hz = {PortKind.GCS: gcs_Hz, PortKind.SHARED: gcs_Hz, PortKind.ONBOARD: onboard_Hz}
     return Stream(by_name(name), values or getattr(messages, name.lower()), rates_Hz)
 
 
@@ -128,8 +140,9 @@ class Schedule:
 
     __slots__ = ("_defaults", "_heap", "intervals_us", "next_us")
 
-    def __init__(self, kind: PortKind, now_us: int) -> None:
-        self._defaults = _DEFAULT_INTERVALS[kind]
+    def __init__(self, kind: PortKind, now_us: int, rate_max_Hz: float = math.inf) -> None:
+        shortest_us = 0 if math.isinf(rate_max_Hz) else round(1e6 / rate_max_Hz)
+        self._defaults = [max(each, shortest_us) if each > 0 else each for each in _DEFAULT_INTERVALS[kind]]
         self.intervals_us = list(self._defaults)
         self._rebuild(now_us)
 

@@ -70,6 +70,6 @@ def alive_key(instance: int) -> str:
     return f"{ROOT}/{instance}/alive"
 
 
-def all_keys(instance: int) -> str:
-    """The key expression of everything that one vehicle publishes and answers."""
-    return f"{ROOT}/{instance}/**"
+def all_keys(instance: int | None = None) -> str:
+    """The key expression of everything that one vehicle publishes and answers; None: every vehicle."""
+    return f"{ROOT}/{'*' if instance is None else instance}/**"

@@ -1,18 +1,19 @@
-"""The Zenoh edge: sends what the feed says, answers queries, holds the liveliness token.
+"""The Zenoh edge: sends what the feeds say, answers queries, holds the liveliness tokens. One session, all vehicles.
 
 Sending runs inside the loop's turn. A put takes some microseconds and never waits: congestion control is DROP with no
 grace time, so a full queue behind a slow, stopped or dead subscriber costs the subscriber its messages only.
 
 Answering can wait for the asker, as long as `PATIENCE_S`: a reply goes out with the congestion control that the query
-asked for, and that is BLOCK unless the asker says otherwise. So a thread of its own takes queries and sends replies;
-the loop only builds the payloads and hands them over, and telemetry goes out in another priority's queue than replies.
+asked for, and that is BLOCK unless the asker says otherwise. So a thread of its own takes queries and sends replies,
+for all vehicles; the loop only builds the payloads and hands them over, one vehicle's in a turn, and telemetry goes out
+in another priority's queue than replies.
 """
 
 import logging
 import queue
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import zenoh
@@ -62,18 +63,25 @@ def open_session(endpoint: str) -> Any:
 
 
 class Answerer(threading.Thread):
-    """Takes queries, has the loop build the answers, and sends them: one query after the other.
+    """Takes queries, has the loop build the answers, and sends them: one query after the other, vehicle by vehicle.
 
     The queue is first-in, first-out and never gives a query up: giving one up would tell the asker so, and wait for it
     to listen while holding the lock that the next query needs.
     """
 
-    def __init__(self, session: Any, instance: int) -> None:
+    def __init__(self, session: Any, instances: Sequence[int]) -> None:
         super().__init__(name="zenoh answers", daemon=True)
-        self.asked: queue.SimpleQueue[list[Topic]] = queue.SimpleQueue()  # to the loop
+        # to the loop, vehicle by vehicle
+        self.asked: dict[int, queue.SimpleQueue[list[Topic]]] = {i: queue.SimpleQueue() for i in instances}
         self.answers: queue.SimpleQueue[list[tuple[Topic, bytes]] | None] = queue.SimpleQueue()  # back; None: the end
-        self._keys = {topic: zenoh.KeyExpr(keys.key(instance, topic)) for topic in keys.TOPICS if topic.queryable}
-        self._queries = session.declare_queryable(keys.all_keys(instance), zenoh.handlers.FifoChannel(QUERIES_WAITING))
+        self._topics = {
+            (instance, zenoh.KeyExpr(keys.all_keys(instance))): {
+                topic: zenoh.KeyExpr(keys.key(instance, topic)) for topic in keys.TOPICS if topic.queryable
+            }
+            for instance in instances
+        }
+        whose = instances[0] if len(instances) == 1 else None
+        self._queries = session.declare_queryable(keys.all_keys(whose), zenoh.handlers.FifoChannel(QUERIES_WAITING))
 
     def run(self) -> None:
         while True:
@@ -81,32 +89,52 @@ class Answerer(threading.Thread):
                 query = self._queries.recv()
             except zenoh.ZError:
                 return  # the session is closed
-            self.asked.put([topic for topic, key in self._keys.items() if query.key_expr.intersects(key)])
-            answers = self.answers.get()
-            if answers is None:
-                return
             try:
-                for topic, payload in answers:
-                    query.reply(self._keys[topic], payload, encoding=topic.encoding)
+                for (instance, everything), topics in self._topics.items():
+                    if not query.key_expr.intersects(everything):
+                        continue
+                    self.asked[instance].put([topic for topic, key in topics.items() if query.key_expr.intersects(key)])
+                    answers = self.answers.get()
+                    if answers is None:
+                        return
+                    for topic, payload in answers:
+                        query.reply(topics[topic], payload, encoding=topic.encoding)
                 query.drop()  # tells the asker that there are no more replies
             except zenoh.ZError as error:
                 log.debug("an asker went away: %s", error)
 
 
-class Publisher:
-    """One vehicle's telemetry on an open session, which it closes."""
+class Session:
+    """An open session, and the one who answers there for all the vehicles that it carries."""
 
-    def __init__(self, session: Any, instance: int, clock: Callable[[], float] = time.perf_counter) -> None:
+    def __init__(self, endpoint: str, instances: Sequence[int]) -> None:
+        """Raises ZenohUnavailableError."""
+        self.zenoh = open_session(endpoint)
+        self.answerer = Answerer(self.zenoh, instances)
+        self.answerer.start()
+
+    def close(self) -> None:
+        self.answerer.answers.put(None)
+        try:
+            self.zenoh.close()
+        except zenoh.ZError as error:
+            log.warning("Zenoh did not close cleanly: %s", error)
+        self.answerer.join(2.0 * PATIENCE_S)  # a thread inside Zenoh as the interpreter ends would abort the process
+
+
+class Publisher:
+    """One vehicle's telemetry on an open session."""
+
+    def __init__(self, session: Session, instance: int, clock: Callable[[], float] = time.perf_counter) -> None:
         self.messages = 0
         self.busy_s = 0.0  # spent in `turn` in all
         self.worst_s = 0.0  # longest `turn`
         self.faults = 0
-        self._session = session
         self._clock = clock
         self._complained_s = float("-inf")
         self._feed: Feed | None = None
         self._publishers = {
-            topic: session.declare_publisher(
+            topic: session.zenoh.declare_publisher(
                 keys.key(instance, topic),
                 encoding=topic.encoding,
                 congestion_control=zenoh.CongestionControl.DROP,
@@ -115,17 +143,17 @@ class Publisher:
             for topic in keys.TOPICS
             if topic.cadence is not keys.Cadence.QUERY
         }
-        self._answerer = Answerer(session, instance)
-        self._answerer.start()
-        self._token = session.liveliness().declare_token(keys.alive_key(instance))
+        self._asked, self._answers = session.answerer.asked[instance], session.answerer.answers
+        self._token = session.zenoh.liveliness().declare_token(keys.alive_key(instance))
 
-    def attach(self, feed: Feed) -> None:
-        """Send this feed from now on."""
+    def attach(self, feed: Feed | None) -> None:
+        """Send this feed from now on; None: nothing, and answer nothing."""
         self._feed = feed
 
     def turn(self, wall_s: float) -> None:
         """Send what is due and answer what was asked. Never raises: telemetry must not stop a flight."""
         if self._feed is None:
+            self._decline()
             return
         start = self._clock()
         try:
@@ -144,13 +172,19 @@ class Publisher:
         return bool(self._publishers[topic].matching_status.matching)
 
     def _answer(self, feed: Feed) -> None:
-        if self._answerer.asked.empty():
+        if self._asked.empty():
             return
         answers: list[tuple[Topic, bytes]] = []
         try:
-            answers.extend((topic, feed.latest(topic)) for topic in self._answerer.asked.get())
+            answers.extend((topic, feed.latest(topic)) for topic in self._asked.get())
         finally:
-            self._answerer.answers.put(answers)  # also where it failed: somebody waits for it
+            self._answers.put(answers)  # also where it failed: somebody waits for it
+
+    def _decline(self) -> None:
+        """Somebody waits for an answer all the same."""
+        if not self._asked.empty():
+            self._asked.get()
+            self._answers.put([])
 
     def _complain(self, wall_s: float) -> None:
         self.faults += 1
@@ -159,11 +193,11 @@ class Publisher:
             log.exception("telemetry: fault %d", self.faults)
 
     def close(self) -> None:
-        """Undeclare the token, so that listeners hear at once that the vehicle is gone, and close the session."""
-        self._answerer.answers.put(None)
+        """Undeclare the token, so that listeners hear at once that the vehicle is gone. Twice is once."""
+        token, self._token = self._token, None
+        if token is None:
+            return
         try:
-            self._token.undeclare()
-            self._session.close()
+            token.undeclare()
         except zenoh.ZError as error:
-            log.warning("Zenoh did not close cleanly: %s", error)
-        self._answerer.join(2.0 * PATIENCE_S)  # a thread inside Zenoh as the interpreter ends would abort the process
+            log.warning("Zenoh did not take the vehicle's token back: %s", error)

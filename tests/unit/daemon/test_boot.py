@@ -15,6 +15,10 @@ STRANGER = (Port.ONBOARD, ("127.0.0.1", 50_000))
 HEARTBEAT = Encoder(255, 190).encode(message("HEARTBEAT", type=6, mavlink_version=3))
 
 
+def voices(*systems: int) -> dict:
+    return dict.fromkeys((Port.GCS, Port.ONBOARD), systems)
+
+
 class Wire:
     """Sockets that keep what is sent."""
 
@@ -40,7 +44,7 @@ def wire() -> Wire:
 
 
 def test_the_first_turn_already_heartbeats_as_booting(wire) -> None:
-    Boot(wire, Identity.PX4, 7, [STATIC]).turn(100.0)
+    Boot(wire, Identity.PX4, voices(7), [STATIC]).turn(100.0)
     ((peer, data),) = wire.taken()
     (frame,) = Parser().feed(data)
     assert peer == STATIC
@@ -52,7 +56,7 @@ def test_the_first_turn_already_heartbeats_as_booting(wire) -> None:
 
 
 def test_the_heartbeat_is_repeated_each_second_and_numbered(wire) -> None:
-    boot = Boot(wire, Identity.GENERIC, 1, [STATIC])
+    boot = Boot(wire, Identity.GENERIC, voices(1), [STATIC])
     for k in range(100):
         boot.turn(k * 0.05)
     frames = [Parser().feed(data)[0] for _, data in wire.taken()]
@@ -62,7 +66,7 @@ def test_the_heartbeat_is_repeated_each_second_and_numbered(wire) -> None:
 
 
 def test_whoever_says_hello_is_answered_at_once_and_introduced_later(wire) -> None:
-    boot = Boot(wire, Identity.PX4, 1, [STATIC])
+    boot = Boot(wire, Identity.PX4, voices(1), [STATIC])
     boot.turn(0.0)
     wire.taken()
     wire.incoming = [(STRANGER, HEARTBEAT)]
@@ -74,7 +78,7 @@ def test_whoever_says_hello_is_answered_at_once_and_introduced_later(wire) -> No
 
 
 def test_requests_and_garbage_are_not_kept(wire) -> None:
-    boot = Boot(wire, Identity.PX4, 1, [])
+    boot = Boot(wire, Identity.PX4, voices(1), [])
     arm = Encoder(255, 190).encode(message("COMMAND_LONG", target_system=1, command=400, param1=1.0))
     wire.incoming = [(STRANGER, arm), (STRANGER, b""), (STRANGER, b"\xfd"), (STRANGER, HEARTBEAT + arm)]
     boot.turn(0.0)
@@ -83,7 +87,7 @@ def test_requests_and_garbage_are_not_kept(wire) -> None:
 
 
 def test_a_crowd_is_not_remembered_without_end(wire) -> None:
-    boot = Boot(wire, Identity.PX4, 1, [])
+    boot = Boot(wire, Identity.PX4, voices(1), [])
     wire.incoming = [((Port.GCS, ("127.0.0.1", port)), HEARTBEAT) for port in range(2000, 2500)]
     boot.turn(0.0)
     assert len(boot.heard) < 20

@@ -7,7 +7,8 @@ import pytest
 
 from sitl.daemon.clock import SLICE_US, TURN_S
 from sitl.daemon.config import Port
-from sitl.daemon.loop import QUIET_S, RECEIVE_BUDGET_S, WAKES_MAX, Ending, Loop
+from sitl.daemon.loop import RECEIVE_BUDGET_S, WAKES_MAX, Ending, Loop
+from sitl.daemon.member import QUIET_S, Member
 from sitl.mavlink.peers import PortKind
 from sitl.onboard.events import EventLog
 from sitl.onboard.modes import EventKind
@@ -128,7 +129,8 @@ class Bench:
         self.craft = Craft()
         self.link = Link(self.craft)
         self.wire = Wire(self.clock)
-        self.loop = Loop(self.craft, self.link, self.wire, self.clock)
+        self.member = Member(self.craft, self.link, {PortKind.GCS: Port.GCS, PortKind.ONBOARD: Port.ONBOARD})
+        self.loop = Loop([self.member], self.wire, self.clock)
 
     def run(self, seconds: float) -> Ending:
         end_s = self.clock() + seconds
@@ -320,7 +322,8 @@ def test_the_recorder_sees_frames_with_their_time_and_room_is_asked_for_before_e
 
     tape = Tape()
     bench.craft.advance = lambda until_us, trace: Craft.advance(bench.craft, until_us)
-    bench.loop.record_with(tape)
+    bench.member.recorder = tape
+    bench.member.watch_frames(bench.clock)
     bench.link.on_frame(b"\xfdabc", True)
     bench.run(0.005)
     assert tape.seen[0] == (b"\xfdabc", 1000.0)
