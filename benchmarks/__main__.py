@@ -21,6 +21,7 @@ NAMES = {
     "gains": "from a gain's write to the control step that uses it",
     "transfers": "the parameter list, 500 mission items up and down, a log of 1 MB, over UDP",
     "lateness": "the loop's deadlines beside a bare sleep loop's: recording, and with a listener that never reads",
+    "view": "the viewer's share of a core, its updates, the loop's deadlines with it and without; 2 min",
     "flood": "20,000 messages a second from one address: heartbeats to another, the loop's deadlines; 1 min",
     "fuzz": "a million hostile datagrams against a hovering vehicle; 4 min, 50,000 with --quick",
     "soak": "30 simulated hours of missions; 10 min, 3 hours with --quick",

@@ -52,11 +52,12 @@ def measure(quick: bool) -> Iterator[Figure]:
 
 def _share(pid: int) -> float:
     """Percent of a core over a window."""
-    start_s, busy_s = time.perf_counter(), _busy_s(pid)
+    start_s, before_s = time.perf_counter(), busy_s(pid)
     time.sleep(WINDOW_S)
-    return 100.0 * (_busy_s(pid) - busy_s) / (time.perf_counter() - start_s)
+    return 100.0 * (busy_s(pid) - before_s) / (time.perf_counter() - start_s)
 
 
-def _busy_s(pid: int) -> float:
+def busy_s(pid: int) -> float:
+    """Time in user and system mode that a process has taken so far."""
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")  # utime, stime

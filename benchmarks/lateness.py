@@ -48,24 +48,24 @@ class Recorded(Lateness):
 def measure(quick: bool) -> Iterator[Figure]:
     logging.getLogger("sitl").setLevel(logging.WARNING)
     config = RunConfig(instance=free_instance(), settings=(("SIM_TLM_RATE", FULL_RATE_HZ),))
-    with _assembled(config) as loop:
+    with assembled(config) as loop:
         watch = ("watch", "--connect", ground(config.instance), "--system", str(config.system_id))
         with running(start("gcs_tools", *watch)):
-            yield from _beside(loop, "with a ground station", subscribed=False)
+            yield from beside(loop, "with a ground station", subscribed=False)
             endpoint = assembly.zenoh_endpoint(config)
             with listener(endpoint, "read"):
-                yield from _beside(loop, "and a subscriber that reads")
+                yield from beside(loop, "and a subscriber that reads")
             with listener(endpoint, "never"):
-                yield from _beside(loop, "and a subscriber that never reads")
+                yield from beside(loop, "and a subscriber that never reads")
             with listener(endpoint, "read") as process:
-                _turn(loop, Recorded(), SETTLE_S)  # its subscription is in force before it stops
+                turn(loop, Recorded(), SETTLE_S)  # its subscription is in force before it stops
                 process.send_signal(signal.SIGSTOP)
-                yield from _beside(loop, "and a subscriber that is stopped")
+                yield from beside(loop, "and a subscriber that is stopped")
         figures = loop.figures()
-    with _assembled(config._replace(record=True)) as loop:
+    with assembled(config._replace(record=True)) as loop:
         watch = ("watch", "--connect", ground(config.instance), "--system", str(config.system_id))
         with running(start("gcs_tools", *watch)):
-            yield from _beside(loop, "with a ground station, recording the flight", subscribed=False)
+            yield from beside(loop, "with a ground station, recording the flight", subscribed=False)
     yield told(
         "  telemetry in all of it",
         f"{figures.telemetry_messages} messages, longest turn {figures.telemetry_worst_ms:.2f} ms, "
@@ -74,7 +74,7 @@ def measure(quick: bool) -> Iterator[Figure]:
 
 
 @contextlib.contextmanager
-def _assembled(config: RunConfig) -> Iterator[Loop]:
+def assembled(config: RunConfig) -> Iterator[Loop]:
     """What `sitl run` puts together, in this process."""
     clock = wall_clock()
     with contextlib.ExitStack() as stack:
@@ -98,13 +98,13 @@ def _assembled(config: RunConfig) -> Iterator[Loop]:
         yield loop
 
 
-def _beside(loop: Loop, what: str, subscribed: bool = True) -> Iterator[Figure]:
+def beside(loop: Loop, what: str, subscribed: bool = True) -> Iterator[Figure]:
     """The loop and the bare one in turns; medians and 99th percentiles, and their ratio."""
     ours, bare = Recorded(), []
     loop.lateness = ours
     sent = loop.figures().telemetry_messages
     for _ in range(SEGMENTS):
-        _turn(loop, ours, SEGMENT_S)
+        turn(loop, ours, SEGMENT_S)
         bare += _bare(SEGMENT_S)
     sent = loop.figures().telemetry_messages - sent
     if subscribed and not sent:
@@ -118,7 +118,7 @@ def _beside(loop: Loop, what: str, subscribed: bool = True) -> Iterator[Figure]:
     )
 
 
-def _turn(loop: Loop, record: Recorded, seconds: float) -> None:
+def turn(loop: Loop, record: Recorded, seconds: float) -> None:
     clock = wall_clock()
     begun_s = clock()
     record.since_s = begun_s + LEFT_OUT_S
