@@ -110,9 +110,12 @@ def chromium() -> Iterator[Any]:
 
 
 @contextlib.contextmanager
-def looking_at(browser: Any, url: str) -> Iterator[Any]:
-    """A browser page that shows `url`, from when the page is drawn. Its script errors fail the test at the end."""
-    page = browser.new_page(viewport={"width": SIZE[0], "height": SIZE[1]})
+def looking_at(browser: Any, url: str, size: tuple[int, int] = SIZE, sharpness: float = 1.0) -> Iterator[Any]:
+    """A browser page that shows `url`, from when the page is drawn. Its script errors fail the test at the end.
+
+    sharpness: pixels drawn for each of the page's; below 1 the scene, drawn without a graphics card, costs less.
+    """
+    page = browser.new_page(viewport={"width": size[0], "height": size[1]}, device_scale_factor=sharpness)
     errors: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))
     try:
