@@ -80,7 +80,7 @@ class Pilot:
         """Have a parameter written. Of several values asked for before the first is sent, the last one is written."""
         with self._lock:
             if self.up:
-                self._wanted.pop(name, None)
+                self._wanted.pop(name, None)  # so that it comes after what was asked for meanwhile
                 self._wanted[name] = value
 
     def value(self, name: str) -> float | None:

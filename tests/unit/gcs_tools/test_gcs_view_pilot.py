@@ -74,6 +74,7 @@ def test_what_is_asked_of_a_lost_vehicle_never_reaches_it() -> None:
     met.run(1.0)
     met.pilot.ask(takeoff)
     met.pilot.write("RATE_Y_P", 0.25)
+    met.pilot.write("SIM_PAUSE", 1.0)
     met.until(lambda: not met.pilot.up)
     assert met.pilot.trouble == "nothing heard from the vehicle for 3 s"
     met.pilot.ask(takeoff)
@@ -103,3 +104,13 @@ def test_a_parameter_that_the_vehicle_does_not_have_is_told() -> None:
     met.pilot.write("NOPE", 1.0)
     met.run(0.2)
     assert met.texts() == ["NOPE: the vehicle has no such parameter"]
+
+
+def test_what_is_written_again_is_written_after_what_was_asked_for_meanwhile() -> None:
+    met = Met()
+    written: list[str] = []
+    met.vehicle._value = written.append  # type: ignore[method-assign]
+    for name, value in (("POS_X_P", 1.0), ("SIM_PAUSE", 1.0), ("POS_X_P", 2.0)):
+        met.pilot.write(name, value)
+    met.run(20.0)
+    assert list(dict.fromkeys(written)) == ["SIM_PAUSE", "POS_X_P"]
