@@ -25,7 +25,7 @@ NORTH_N = (1.0, 0.0, 0.0)
 FOLLOWING = ("chase", "side", "top")
 NAMES = (*FOLLOWING, "onboard", "free")
 FIRST = "chase"
-OFFSETS_H_M = {"chase": (-1.25, 0.45, -0.5), "side": (0.0, 1.6, -0.1), "top": (0.0, 0.0, -4.0)}
+OFFSETS_H_M = {"chase": (-1.25, 0.45, -0.5), "side": (0.0, 1.6, -0.1), "top": (0.0, 0.0, -6.0)}
 """From the vehicle to the camera: ahead (where the belly faces), right, down."""
 ONBOARD_B_M = (0.06, 0.0, 0.075)  # before the belly, below the nose
 TURN_TAU_S = 0.8  # with which chase and side turn after the vehicle's heading

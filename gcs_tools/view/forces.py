@@ -8,14 +8,14 @@ from gcs_tools.view.airframe_mesh import Dimensions
 from gcs_tools.view.topics import Load, Triple
 
 COLOURS_RGB = {
-    "gravity": (245, 190, 65),
-    "thrust": (235, 75, 75),
-    "aero": (70, 150, 255),
-    "flaps": (80, 210, 120),
-    "side_force": (200, 110, 240),
-    "drag": (150, 160, 170),
-    "ground": (170, 120, 80),
-    "total": (255, 255, 255),
+    "gravity": (235, 160, 0),
+    "thrust": (225, 40, 40),
+    "aero": (30, 110, 240),
+    "flaps": (30, 180, 80),
+    "side_force": (175, 60, 225),
+    "drag": (130, 140, 150),
+    "ground": (150, 95, 50),
+    "total": (245, 245, 245),
 }
 OTHER_RGB = (0, 200, 200)  # of a cause that has no name here
 LEAST_N = 0.02  # smaller ones are not drawn

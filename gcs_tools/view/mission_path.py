@@ -12,7 +12,7 @@ from gcs_tools.view.vehicle import Vehicle
 RGB = (255, 150, 0)
 PLUMB_RGB = (90, 60, 10)
 LABELLED_MAX = 40  # points; a survey's hundreds would hide the scene
-POINT_M, CURRENT_M = 0.035, 0.07
+POINT_M, CURRENT_M = 0.03, 0.055
 
 
 def path(mission: Mission) -> list[Triple]:

@@ -20,6 +20,7 @@ ERROR_FULL_M = 0.10  # where the trail's colour ends
 METRES_PER_N = 0.035
 WIND_METRES_PER_M_S = 0.25
 CALM_M_S = 0.05
+ABOVE_M = 0.45  # the vehicle: the wind's arrow
 NOTHING = np.zeros((1, 2, 3), dtype=np.float32)
 _POSITION = [INDEX[name] for name in ("north_m", "east_m", "down_m")]
 _REFERENCE = [INDEX[name] for name in ("reference_north_m", "reference_east_m", "reference_down_m")]
@@ -76,10 +77,13 @@ class Overlays:
         self._ground_down_m = ground_down_m
         self._mission = MissionPath(scene, root, ground_down_m)
         self._added = 0  # rows of the history when the paths were drawn
+        self._air = scene.add_frame(f"{root}/air", show_axes=False)  # goes with the vehicle, without turning
         self._wind: Any = scene.add_arrows(
-            f"{root}/wind", NOTHING, (120, 220, 255), shaft_radius=0.012, head_radius=0.035, head_length=0.08
+            f"{root}/air/wind", NOTHING, (120, 220, 255), shaft_radius=0.012, head_radius=0.035, head_length=0.08
         )
-        self._wind_label = scene.add_label(f"{root}/wind_label", "", font_screen_scale=0.8, anchor="bottom-center")
+        self._wind_label = scene.add_label(
+            f"{root}/air/label", "", font_screen_scale=0.8, anchor="bottom-center", position=(0.0, 0.0, -ABOVE_M - 0.06)
+        )
         self._forces: Any = scene.add_arrows(
             f"{root}/body/forces", NOTHING, np.zeros((1, 3), np.uint8),
             shaft_radius=0.006, head_radius=0.016, head_length=0.04,
@@ -96,12 +100,13 @@ class Overlays:
         """What moves with the vehicle."""
         if self._forces.visible:
             self._draw_forces(instant)
-        if self._wind.visible:
-            self._draw_wind(instant.state.position_N_m, instant.state.wind_N_m_s)
+        self._air.position = instant.state.position_N_m
 
     def update_slowly(self, vehicle: Vehicle) -> None:
         """What need not follow every instant."""
         self._mission.update(vehicle)
+        if self._wind.visible and vehicle.instant is not None:
+            self._draw_wind(vehicle.instant.state.wind_N_m_s)
         if vehicle.mode is not None:
             north, east, down = vehicle.mode.home_N_m
             self._home.position = (north, east, down + self._ground_down_m)
@@ -119,16 +124,15 @@ class Overlays:
         if len(rows) > 1 and self._reference.visible:
             self._reference.points = segments(rows[:, _REFERENCE])
 
-    def _draw_wind(self, position_N_m: Triple, wind_N_m_s: Triple) -> None:
+    def _draw_wind(self, wind_N_m_s: Triple) -> None:
         """Above the vehicle, with its middle over it."""
         speed = math.hypot(*wind_N_m_s)
-        middle = np.add(position_N_m, (0.0, 0.0, -0.55))
         if speed < CALM_M_S:
             self._wind.points, self._wind_label.text = NOTHING, ""
             return
+        middle = np.array((0.0, 0.0, -ABOVE_M))
         half = 0.5 * WIND_METRES_PER_M_S * np.array(wind_N_m_s)
         self._wind.points = np.array([[middle - half, middle + half]], dtype=np.float32)
-        self._wind_label.position = np.add(middle, (0.0, 0.0, -0.06))
         self._wind_label.text = f"wind {speed:.1f} m/s"
 
     def _draw_forces(self, instant: Instant) -> None:

@@ -20,8 +20,8 @@ from gcs_tools.view.vehicle import Vehicle
 from sitl.geodesy import GeoPoint, to_local
 
 UP_N = (0.0, 0.0, -1.0)
-SLOW_S = 0.2  # between two drawings of what need not follow every instant
-BACKGROUND_RGB = (20, 20, 20)
+SLOW_S = 0.1  # between two drawings of what need not follow every instant
+SKY_RGB, FLOOR_RGB = np.array([44.0, 58.0, 78.0]), np.array([14.0, 16.0, 20.0])
 
 
 class Scene:
@@ -31,7 +31,8 @@ class Scene:
         server.initial_camera.up = UP_N
         server.initial_camera.position = (-2.2, 1.2, -1.2)
         server.initial_camera.look_at = (0.0, 0.0, -0.2)
-        self._scene.configure_environment_map("studio", environment_intensity=0.6)
+        self._scene.configure_environment_map("studio", environment_intensity=0.5)
+        self._scene.set_background_image(_sky(), format="png")
         self._ground: Any = None
         self._drawn: dict[int, _Drawn] = {}
         self._origin: GeoPoint | None = None
@@ -84,8 +85,8 @@ class Scene:
         if self._ground is None:
             self._ground = self._scene.add_grid(
                 "/ground", infinite_grid=True, plane="xy", cell_size=0.5, section_size=5.0,
-                cell_color=(60, 66, 76), section_color=(95, 105, 120), cell_thickness=0.6, section_thickness=1.0,
-                fade_distance=45.0, fade_strength=1.5, shadow_opacity=0.45, position=(0.0, 0.0, ground_down_m),
+                cell_color=(52, 60, 72), section_color=(88, 104, 126), cell_thickness=0.7, section_thickness=1.1,
+                fade_distance=60.0, fade_strength=1.5, shadow_opacity=0.5, position=(0.0, 0.0, ground_down_m),
             )  # fmt: skip
         north_m, east_m = to_local(self._origin, origin.lat_deg, origin.lon_deg)
         offset_N_m = np.array([north_m, east_m, self._origin.alt_amsl_m - origin.alt_amsl_m])
@@ -95,6 +96,12 @@ class Scene:
         drawn = _Drawn(vehicle.epoch, offset_N_m, airframe, Overlays(self._scene, root, d, ground_down_m))
         drawn.show(self._shown)
         return drawn
+
+
+def _sky() -> NDArray[np.uint8]:
+    """A picture (height, width, 3) behind everything: dark, a little lighter above."""
+    shade = np.linspace(0.0, 1.0, 64)[:, None, None]
+    return np.repeat((SKY_RGB * (1.0 - shade) + FLOOR_RGB * shade).astype(np.uint8), 4, axis=1)
 
 
 class _Drawn:
