@@ -445,6 +445,12 @@ def _campaign(args: argparse.Namespace) -> int:
     return campaigns.main(args)
 
 
+def _dataset(args: argparse.Namespace) -> int:
+    from sitl.campaign import dataset
+
+    return dataset.main(args)
+
+
 def _is_mistake(error: ValueError) -> bool:
     """Whether the person at the keyboard can mend it; files that can't be used say so with a ConfigError."""
     from sitl.strict_yaml import ConfigError
@@ -461,6 +467,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "trim": _trim,
         "reproduce": _reproduce,
         "campaign": _campaign,
+        "dataset": _dataset,
     }
     try:
         return commands[args.command](args)

@@ -237,7 +237,8 @@ class _Checks:
             self._fault("gust_m_s", f"{where} {case.gust_m_s:g}; allowed 0 … {GUST_MAX_M_S:g}")
 
 
-def digest(found: list[Case], equipment: Equipment) -> str:
-    """Of everything that decides what the flights are; campaigns with the same one are the same flights."""
-    whole = repr((found, sorted(equipment.texts.items()), equipment.vehicles, equipment.gains))
+def digest(campaign: Campaign, found: list[Case], equipment: Equipment) -> str:
+    """Of everything that decides what is flown and kept; campaigns with the same one have the same results."""
+    kept = campaign.trace_every, campaign.trace_rate_hz, sorted(campaign.success.items()), campaign.split
+    whole = repr((kept, found, sorted(equipment.texts.items()), equipment.vehicles, equipment.gains))
     return hashlib.sha256(whole.encode()).hexdigest()[:16]

@@ -14,6 +14,7 @@ import sitl
 from sitl import batch
 from sitl.batch import Outcome
 from sitl.campaign.cases import Case, Equipment
+from sitl.campaign.mcap_file import recording
 from sitl.campaign.results import FIGURES, TRACE, TRACE_SOURCES
 from sitl.closed_loop import TRACE_COLUMNS
 
@@ -23,11 +24,15 @@ _PICKED = [TRACE_COLUMNS.index(name) for name in TRACE_SOURCES]
 
 
 class Job(NamedTuple):
-    """A flight to be flown. trace_hz: 0 keeps no trace."""
+    """A flight to be flown.
+
+    trace_hz: 0 keeps no trace. success: figures and their limits. mcap: the trace is wanted as .mcap too.
+    """
 
     case: Case
     trace_hz: float
     success: tuple[tuple[str, float], ...] = ()
+    mcap: bool = False
 
 
 class Flight(NamedTuple):
@@ -36,6 +41,7 @@ class Flight(NamedTuple):
     number: int
     row: dict[str, Any]
     trace: list[NDArray[Any]] | None = None
+    mcap: bytes | None = None
 
 
 def fly(equipment: Equipment, job: Job) -> Flight:
@@ -60,7 +66,8 @@ def fly(equipment: Equipment, job: Job) -> Flight:
     figures = _figures(outcome)
     success = word == "completed" and all(figures[name] <= limit for name, limit in job.success)
     row = _row(case, word, reason, success) | figures | {"simulated_s": outcome.end_s}
-    return Flight(case.number, row, _trace(outcome, job.trace_hz))
+    trace = _trace(outcome, job.trace_hz)
+    return Flight(case.number, row, trace, recording(trace, row) if job.mcap and trace else None)
 
 
 def lost(job: Job, reason: str) -> Flight:

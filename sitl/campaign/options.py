@@ -27,6 +27,25 @@ exit status: 0 when all flights are flown and kept, also those that failed; 1 wh
 that can't be used; 130 after Ctrl-C.
 """
 
+DATASET = """\
+Fly episodes for learning: state, reference, action and wind of each at a fixed rate, as Parquet with units and frames,
+split into train, validation and test by episode, with a data card. Without a file: yawsitter-real along smooth random
+flights in wind with gusts, from any heading. With one: whatever a campaign's file says (docs/campaigns.md).
+
+Needs pip install 'yawsitter-sitl[campaign]', for --mcap [record], for --cluster [cluster].
+"""
+
+DATASET_EXAMPLES = """\
+examples:
+  sitl dataset --episodes 100                                     random flights at 50 Hz, into out/dataset
+  sitl dataset --episodes 1000 --mission missions/rectangle.yaml --rate 100 --out out/rectangles
+  sitl dataset examples/campaigns/episodes.yaml --mcap            with one .mcap for each episode too
+  sitl dataset --episodes 10000 --resume                          go on after Ctrl-C
+
+exit status: as 'sitl campaign'.
+"""
+
+_HELP_DATASET = "fly episodes of state, reference, action and wind for learning"
 _HELP_CAMPAIGN = "fly a mission many times, vary what you like, and report"
 
 Command = Callable[[str, str, str, str], argparse.ArgumentParser]
@@ -39,6 +58,16 @@ def _whole(text: str) -> int:
         value = 0
     if not 1 <= value <= 1_000_000:
         raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 1 to 1000000")
+    return value
+
+
+def _rate(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 1.0 <= value <= 500.0:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a rate from 1 to 500 Hz")
     return value
 
 
@@ -57,3 +86,16 @@ def add(command: Command) -> None:
     campaign.add_argument("--out", type=Path, metavar="DIR", help="the results' folder (out/ and the file's name)")
     campaign.add_argument("--report", type=Path, metavar="DIR", help="only write the report of a campaign's folder")
     campaign.add_argument("--json", action="store_true", help="print the summary as one JSON object")
+
+    dataset = command("dataset", _HELP_DATASET, DATASET, DATASET_EXAMPLES)
+    dataset.add_argument("dataset", type=Path, nargs="?", metavar="DATASET", help="a campaign's file (.yaml)")
+    dataset.add_argument("--episodes", type=_whole, metavar="N", help="without a file: how many (100)")
+    dataset.add_argument("--mission", metavar="MISSION", help="without a file: a mission's file (random flights)")
+    dataset.add_argument("--vehicle", metavar="NAME|FILE", help="without a file: which vehicle (yawsitter-real)")
+    dataset.add_argument("--rate", type=_rate, metavar="HZ", help="without a file: samples a second (50)")
+    dataset.add_argument("--mcap", action="store_true", help="write each episode as .mcap too")
+    _add_workers(dataset)
+    dataset.add_argument(
+        "--out", type=Path, metavar="DIR", help="the data set's folder (out/dataset, or the file's name)"
+    )
+    dataset.add_argument("--json", action="store_true", help="print a summary as one JSON object")

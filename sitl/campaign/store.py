@@ -3,6 +3,7 @@
     DIR/flights/part-00000.parquet          the summary, a row a flight, PART flights a part, in order
     DIR/traces/part-00000.parquet           the traces of those flights that keep one
     DIR/traces/train/part-00000.parquet     in a data set, by its split
+    DIR/mcap/train/episode-000000.mcap      where asked for
 
 A part that isn't complete yet is written too, every few seconds and when the campaign is interrupted; it is written
 again when more of it has been flown. In the end every file's bytes depend on the flights alone.
@@ -17,7 +18,7 @@ from typing import Any
 from sitl.campaign.flight import Flight
 from sitl.campaign.results import TRACE
 
-FLIGHTS, TRACES = "flights", "traces"
+FLIGHTS, TRACES, MCAP = "flights", "traces", "mcap"
 _CODEC = "zstd"
 
 
@@ -83,6 +84,10 @@ class Store:
         self.done.add(flight.number)
         self._rows.setdefault(part, {})[flight.number] = flight.row
         traces = self._traces.setdefault(part, {})
+        if flight.mcap is not None:
+            path = self._folder / MCAP / self._split(flight.number) / f"episode-{flight.number:06d}.mcap"
+            data = flight.mcap
+            atomically(path, lambda to: to.write_bytes(data))
         if flight.trace is not None:
             index = pa.repeat(pa.scalar(flight.number, pa.int64()), len(flight.trace[0]))
             traces[flight.number] = pa.Table.from_arrays([index, *flight.trace], schema=self._schemas[1])

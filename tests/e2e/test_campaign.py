@@ -18,8 +18,7 @@ import pytest
 from gcs_tools.plan import Streamed
 from gcs_tools.reference import Setpoint
 from sitl import __main__ as command_line
-from sitl.campaign import file, workers
-from sitl.campaign import main as campaigns
+from sitl.campaign import file, run, workers
 from sitl.campaign.flight import Job
 from sitl.campaign.progress import Progress
 from sitl.campaign.store import table
@@ -205,8 +204,8 @@ def test_ctrl_c_ends_the_command_and_its_processes_without_a_traceback(campaign:
 
 
 def jobs_of(campaign: Path) -> tuple[Any, list[Job]]:
-    plan = campaigns.plan(file.load(str(campaign)), campaign.parent, campaign.parent, "")
-    return plan.equipment, [Job(case, 0.0, tuple(plan.campaign.success.items())) for case in plan.cases]
+    plan = run.plan(file.load(str(campaign)), campaign.parent, campaign.parent, "")
+    return plan.equipment, [plan.job(case)._replace(trace_hz=0.0) for case in plan.cases]
 
 
 def test_a_killed_process_costs_no_flight(campaign: Path, flown: Path) -> None:

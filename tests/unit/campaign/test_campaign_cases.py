@@ -86,12 +86,15 @@ def test_a_command_line_says_every_setting_to_the_last_bit() -> None:
 
 
 def test_a_campaign_of_other_flights_is_known_by_its_digest() -> None:
+    made = campaign(f"flights: 3\n{WINDY}")
     equipment, found = equipped(f"flights: 3\n{WINDY}")
-    again, same = equipped(f"# other words\nflights: 3\ntraces: true\n{WINDY}")
-    assert digest(found, equipment) == digest(same, again)
+    again, same = equipped(f"# other words\nflights: 3\n{WINDY}")
+    mine = digest(made, found, equipment)
+    assert digest(made, same, again) == mine
     other = equipment._replace(texts={name: text + " " for name, text in equipment.texts.items()})
-    assert digest(found, other) != digest(found, equipment)
-    assert digest(found[:2], equipment) != digest(found, equipment)
+    assert digest(made, found, other) != mine
+    assert digest(made, found[:2], equipment) != mine
+    assert digest(made._replace(trace_every=1), found, equipment) != mine
 
 
 def test_missions_made_up_from_a_seed_differ_by_draw_and_can_be_flown_again_by_name() -> None:
