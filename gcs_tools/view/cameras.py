@@ -29,8 +29,9 @@ OFFSETS_H_M = {"chase": (-1.25, 0.45, -0.5), "side": (0.0, 1.6, -0.1), "top": (0
 """From the vehicle to the camera: ahead (where the belly faces), right, down."""
 ONBOARD_B_M = (0.06, 0.0, 0.075)  # before the belly, below the nose
 TURN_TAU_S = 0.8  # with which chase and side turn after the vehicle's heading
-SAME = 0.02  # two offsets that differ by less of their length are one
+SAME = 0.005  # two offsets that differ by less of their length are one
 REMEMBERED_S = 1.5  # how late a browser may report what it was told
+AHEAD, PATIENCE_S = 3, 0.5  # poses told that a browser has not yet drawn: then wait, or a slow one never sees the hand
 LET_GO_S = 0.25  # after the last report by hand
 SETTLE_S = 1.0  # after a choice, while reports are still of the camera before
 
@@ -64,7 +65,9 @@ class Rig:
         self._offsets = {name: np.array(offset) for name, offset in OFFSETS_H_M.items()}
         self._heading_rad: float | None = None
         self._wall_s = 0.0
+        self._last: Vector | None = None
         self._told: deque[tuple[float, Vector]] = deque()
+        self._ahead = 0  # poses told since the last report
         self._by_hand_s = float("-inf")
         self._settled_s: float | None = None  # None: not yet begun
 
@@ -76,6 +79,7 @@ class Rig:
         self._heading_rad = self._settled_s = None
         self._by_hand_s = float("-inf")
         self._told.clear()
+        self._ahead, self._last = 0, None
 
     def view(self, position: Vector, q_NB: Quadruple, heading_rad: float, wall_s: float) -> View | None:
         """Where the camera should be now; None: leave it where it is."""
@@ -86,11 +90,16 @@ class Rig:
         if self._settled_s is None:
             self._settled_s = wall_s + SETTLE_S
         self._turn(heading_rad, wall_s)
+        if self._ahead >= AHEAD and wall_s < self._told[-1][0] + PATIENCE_S:
+            return None
         offset = turned(self._offsets[self.name], self._heading_rad or 0.0)
+        told = position + offset
+        self._ahead += self._last is None or not np.allclose(told, self._last)  # viser sends what is new
+        self._last = told
         while self._told and self._told[0][0] < wall_s - REMEMBERED_S:
             self._told.popleft()
         self._told.append((wall_s, offset))
-        return View(position + offset, position, NORTH_N if self.name == "top" else UP_N)
+        return View(told, position, NORTH_N if self.name == "top" else UP_N)
 
     def _turn(self, heading_rad: float, wall_s: float) -> None:
         """Go after the heading; the camera from above keeps north up."""
@@ -105,6 +114,7 @@ class Rig:
 
     def reported(self, position: Vector, look_at: Vector, wall_s: float) -> None:
         """The browser's pose, its own or as it was told."""
+        self._ahead = 0
         if self.name not in FOLLOWING or self._settled_s is None or wall_s < self._settled_s:
             return
         offset = position - look_at

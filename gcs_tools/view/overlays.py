@@ -76,6 +76,10 @@ class Overlays:
         scene.add_label(f"{root}/home/label", "home", font_screen_scale=0.8)
         self._ground_down_m = ground_down_m
         self._mission = MissionPath(scene, root, ground_down_m)
+        self._name = scene.add_label(
+            f"{root}/air/name", "", font_screen_scale=0.9, anchor="top-center", position=(0.0, 0.0, 0.24)
+        )
+        self._shown = Shown()
         self._added = 0  # rows of the history when the paths were drawn
         self._air = scene.add_frame(f"{root}/air", show_axes=False)  # goes with the vehicle, without turning
         self._wind: Any = scene.add_arrows(
@@ -91,21 +95,27 @@ class Overlays:
 
     def show(self, shown: Shown) -> None:
         self._trail.visible, self._reference.visible = shown.trail, shown.reference
-        self._wind.visible = self._wind_label.visible = shown.wind
-        self._forces.visible = shown.forces
+        self._shown = shown
+        self._wind.visible = self._wind_label.visible = self._forces.visible = False  # until there is something to show
         self._mission.visible = shown.mission
         self._added = 0
 
+    def name(self, text: str) -> None:
+        """Written below the vehicle; empty: nothing."""
+        if self._name.text != text:
+            self._name.text = text
+            self._name.visible = bool(text)
+
     def update(self, vehicle: Vehicle, instant: Instant) -> None:
         """What moves with the vehicle."""
-        if self._forces.visible:
+        if self._shown.forces:
             self._draw_forces(instant)
         self._air.position = instant.state.position_N_m
 
     def update_slowly(self, vehicle: Vehicle) -> None:
         """What need not follow every instant."""
         self._mission.update(vehicle)
-        if self._wind.visible and vehicle.instant is not None:
+        if self._shown.wind and vehicle.instant is not None:
             self._draw_wind(vehicle.instant.state.wind_N_m_s)
         if vehicle.mode is not None:
             north, east, down = vehicle.mode.home_N_m
@@ -127,8 +137,8 @@ class Overlays:
     def _draw_wind(self, wind_N_m_s: Triple) -> None:
         """Above the vehicle, with its middle over it."""
         speed = math.hypot(*wind_N_m_s)
+        self._wind.visible = self._wind_label.visible = speed >= CALM_M_S
         if speed < CALM_M_S:
-            self._wind.points, self._wind_label.text = NOTHING, ""
             return
         middle = np.array((0.0, 0.0, -ABOVE_M))
         half = 0.5 * WIND_METRES_PER_M_S * np.array(wind_N_m_s)
@@ -138,5 +148,7 @@ class Overlays:
     def _draw_forces(self, instant: Instant) -> None:
         arrows = forces.arrows(instant.loads.causes, instant.loads.total, self._d)
         points = np.array([[a.at_B_m, np.add(a.at_B_m, np.multiply(METRES_PER_N, a.force_B_N))] for a in arrows])
-        self._forces.points = points.astype(np.float32) if len(arrows) else NOTHING
-        self._forces.colors = np.array([forces.colour(a.cause) for a in arrows] or [(0, 0, 0)], dtype=np.uint8)
+        self._forces.visible = bool(arrows)
+        if arrows:
+            self._forces.points = points.astype(np.float32)
+            self._forces.colors = np.array([forces.colour(a.cause) for a in arrows], dtype=np.uint8)

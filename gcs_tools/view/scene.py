@@ -54,6 +54,7 @@ class Scene:
                 drawn.airframe.update(vehicle.instant)
                 drawn.overlays.update(vehicle, vehicle.instant)
             if slowly:
+                drawn.overlays.name(vehicle.name if len(vehicles) > 1 else "")
                 drawn.overlays.update_slowly(vehicle)
 
     def show(self, shown: Shown) -> None:

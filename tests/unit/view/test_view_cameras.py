@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from gcs_tools.view.cameras import LET_GO_S, OFFSETS_H_M, SETTLE_S, Rig, View, turned
+from gcs_tools.view.cameras import AHEAD, LET_GO_S, OFFSETS_H_M, SETTLE_S, Rig, View, turned
 from sitl.frames import standing
 
 HOVER = standing(0.0, math.pi / 2)
@@ -13,6 +13,8 @@ HERE = np.array([3.0, 4.0, -5.0])
 
 
 def at(rig: Rig, wall_s: float, position=HERE, q=HOVER, heading_rad: float = 0.0) -> View:
+    """The view of a browser that keeps up."""
+    rig._ahead = 0
     view = rig.view(position, q, heading_rad, wall_s)
     assert view is not None
     return view
@@ -93,3 +95,19 @@ def test_a_late_report_of_the_camera_before_does_not_spoil_the_one_just_chosen()
     at(rig, 5.0)
     rig.reported(before.position, before.look_at, 5.3)
     assert at(rig, 5.4).position == pytest.approx(HERE + OFFSETS_H_M["top"])
+
+
+def test_a_browser_that_draws_slowly_is_not_told_more_until_it_has_drawn() -> None:
+    rig = Rig()
+    moved = [HERE + np.array([0.1 * k, 0.0, 0.0]) for k in range(30)]
+    views = [rig.view(position, HOVER, 0.0, 0.033 * k) for k, position in enumerate(moved[:8])]
+    assert [view is not None for view in views] == [True] * AHEAD + [False] * (8 - AHEAD)
+    rig.reported(views[0].position, views[0].look_at, 0.3)
+    assert rig.view(moved[9], HOVER, 0.0, 0.3) is not None
+    assert rig.view(HERE, HOVER, 0.0, 99.0) is not None  # nor is one waited for that says nothing
+
+
+def test_a_vehicle_that_stands_still_is_followed_at_once_when_it_moves() -> None:
+    rig = Rig()
+    for k in range(100):
+        assert rig.view(HERE, HOVER, 0.0, 0.033 * k) is not None
