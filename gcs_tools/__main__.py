@@ -22,6 +22,7 @@ examples:
   gcs takeoff --height 3 --wait && gcs land --wait
   gcs param set RATE_Y_P 0.4
   gcs tune step position.x --gains paper --against tuned
+  gcs tune auto all --vehicle yawsitter-real --out found.yaml
   gcs watch --signing-key flight.key                    a vehicle that was started with the same key
   gcs param list --impair loss=0.2,dup=0.05,jitter=0.1  over a bad link
   gcs COMMAND --help explains each

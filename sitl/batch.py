@@ -11,12 +11,15 @@ from typing import NamedTuple
 from gcs_tools import lockstep
 from gcs_tools.plan import Plan, Streamed
 from sitl.batch_flight import BatchFlight, NotFlownError
+from sitl.closed_loop import TRACE_COLUMNS
 from sitl.onboard.modes import Landed
 from sitl.quaternion import Vec3
 from sitl.strict_yaml import ConfigError
 from sitl.tally import Array
 from sitl.vehicle import TICK_US, Vehicle
 from sitl.vehicle_spec import VehicleSpec
+
+__all__ = ["TRACE_COLUMNS", "Outcome", "fly"]
 
 
 class Outcome(NamedTuple):

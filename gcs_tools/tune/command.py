@@ -38,6 +38,38 @@ used; 130 interrupted.
 """
 
 
+AUTO = """\
+Search for the gains of one loop, of some, or of all, by CMA-ES over flights in this process, several at a time.
+
+    gcs tune auto LOOP…    steps on these loops, one manoeuvre each
+    gcs tune auto all      steps on position.x, .y and .z, and a tour of 21 s followed with feed-forward (--course:
+                           other missions instead); they shake the inner loops too
+
+The cost of a flight is tracking + overshoot + effort, each about 1 where it goes well:
+  step    ∫|e| dt / (size × the loop's time: 1 s position, 0.4 velocity, 0.15 attitude, 0.05 rate)
+          + overshoot / 10 % + Σ|du/dt| / 5 per s (motors 0 … 1, flaps −1 … 1)
+  course  mean distance / 1 cm + greatest distance / 10 cm + the same effort
+A manoeuvre costs what its worst flight does, one for each seed of gusts and noise; gains cost the mean of the
+manoeuvres. A flight that fails costs 1000 to 2000, more than any that succeeds.
+
+Sought are the gains that are not 0 (--terms: these terms), on a logarithmic scale up to their declared maximum; a
+ten-thousandth of it counts as 0. The same seed finds the same gains with any number of workers. Whenever something
+better is found the file is written, so Ctrl-C keeps the best so far; --from goes on from it.
+"""
+
+AUTO_EXAMPLES = """\
+examples:
+  gcs tune auto position.x --from paper
+  gcs tune auto all --vehicle yawsitter-real --budget 600 --out found.yaml
+  gcs tune auto rate.q attitude.theta --vehicle yawsitter-real --terms PI
+  gcs tune auto all --course missions/rectangle.yaml --course missions/circle.yaml --wind 1,0,0
+  sitl run --gains found.yaml;  gcs param load found.yaml     use what was found
+
+exit status: 0 searched (a file is written only if it is better than the start); 2 for what can't be used; 130
+interrupted, with the best so far kept.
+"""
+
+
 class Raw(argparse.RawDescriptionHelpFormatter):
     pass
 
@@ -49,6 +81,16 @@ def _loop(text: str) -> Any:
         return loops.parse(text)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _loops(text: str) -> str:
+    return text if text == "all" else str(_loop(text).name)
+
+
+def _terms(text: str) -> str:
+    if not text or set(text.upper()) - set("PID"):
+        raise argparse.ArgumentTypeError(f"'{text}' is not some of the letters P, I, D")
+    return text.upper()
 
 
 def number(text: str) -> float:
@@ -126,15 +168,41 @@ def add(commands: Any, link: argparse.ArgumentParser, parser_class: type[argpars
     step.add_argument("--height", type=within(3.0, 100.0), default=10.0, metavar="M", help="to climb to (10)")
     step.add_argument("--plot", type=Path, metavar="FILE.png", help="draw it; needs the extra [tune]")
     step.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
-    _add_air(step, "--vehicle", "fly this one in lockstep in this process, instead of one over the link")
+    _add_air(step, None, "fly this one in lockstep in this process, instead of one over the link")
+
+    auto = actions.add_parser(
+        "auto",
+        help="search for gains with CMA-ES, write a gains file",
+        description=AUTO,
+        epilog=AUTO_EXAMPLES,
+        formatter_class=Raw,
+        allow_abbrev=False,
+    )
+    auto.add_argument("loops", type=_loops, nargs="+", metavar="LOOP|all", help="whose gains are sought")
+    auto.add_argument("--from", dest="begin", default="own", metavar="NAME|FILE", help="where to begin (own)")
+    auto.add_argument("--terms", type=_terms, metavar="PID", help="seek these terms (those that are not 0)")
+    auto.add_argument("--course", type=Path, action="append", metavar="FILE", help="fly this mission too; may repeat")
+    auto.add_argument("--seeds", type=whole(1, 100), default=2, metavar="N", help="flights of each manoeuvre (2)")
+    auto.add_argument("--budget", type=whole(1, 10**6), default=300, metavar="N", help="candidates to judge (300)")
+    auto.add_argument("--workers", type=whole(1, 1024), metavar="N", help="processes (one a core)")
+    auto.add_argument("--out", type=Path, default=Path("found.yaml"), metavar="FILE", help="(found.yaml)")
+    auto.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
+    _add_air(auto, "yawsitter", "whose gains (yawsitter)", gust="(0.5)", seed="of the search (1)")
+    auto.set_defaults(seed=1)
 
 
-def _add_air(parser: argparse.ArgumentParser, option: str, what: str) -> None:
+def _add_air(
+    parser: argparse.ArgumentParser,
+    vehicle: str | None,
+    what: str,
+    gust: str = "(0)",
+    seed: str = "of gusts and sensor noise (1)",
+) -> None:
     group = parser.add_argument_group("in this process")
-    group.add_argument(option, metavar="NAME|FILE", help=what)
+    group.add_argument("--vehicle", default=vehicle, metavar="NAME|FILE", help=what)
     group.add_argument("--wind", type=_wind, metavar="N,E,D", help="where the air moves, m/s (0,0,0)")
-    group.add_argument("--gust", type=within(0.0, 10.0), metavar="M_S", help="standard deviation of turbulence (0)")
-    group.add_argument("--seed", type=whole(0, 2**32 - 1), metavar="N", help="of gusts and sensor noise (1)")
+    group.add_argument("--gust", type=within(0.0, 10.0), metavar="M_S", help=f"standard deviation of turbulence {gust}")
+    group.add_argument("--seed", type=whole(0, 2**32 - 1), metavar="N", help=seed)
     group.add_argument(
         "--set", type=_setting, action="append", metavar="NAME=VALUE", help="set a parameter; may be given again"
     )
@@ -146,3 +214,7 @@ def run(args: argparse.Namespace) -> None:
         from gcs_tools.tune import stepping
 
         stepping.run(args)
+    else:
+        from gcs_tools.tune import auto
+
+        auto.run(args)
