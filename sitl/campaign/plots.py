@@ -46,11 +46,21 @@ def _errors(r: Results) -> Plot:
             if limit:
                 axes.axvline(limit, color=VERMILION, linestyle="--", label="limit in space")
             axes.set(xscale="log", xlabel=f"{title} [m]", ylim=(0.0, 1.02))
+            _plainly(axes.xaxis)
             axes.legend(loc="lower right")
         figure.axes[0].set_ylabel("share of completed flights with less")
 
     note = "Each curve says which share of the completed flights stayed below an error, by axis and in space."
     return Plot("errors", "Errors of the true position", note, (11.0, 4.0), draw)
+
+
+def _plainly(axis: Any) -> None:
+    """Marks of a logarithmic axis at 1, 2 and 5, as plain numbers."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter(NullFormatter())
 
 
 def _histograms(r: Results) -> Plot:
@@ -76,22 +86,24 @@ def _ranking(ranking: dict[str, list[Influence]]) -> Plot:
         for axes, name in zip(figure.subplots(1, len(SENSITIVITY_OF)), SENSITIVITY_OF, strict=True):
             found = list(reversed(ranking[name][:_SHOWN]))
             places = np.arange(len(found))
-            straight = [i.partial if i.partial == i.partial else i.rank for i in found]
-            middle = [i.middle_partial if i.middle_partial == i.middle_partial else i.middle for i in found]
-            axes.barh(places + 0.19, straight, 0.36, color=BLUE, label="of its value")
-            axes.barh(places - 0.19, middle, 0.36, color=ORANGE, label="of its distance from its median")
-            if found:
-                axes.axvspan(
-                    -found[0].noise, found[0].noise, color="#dddddd", zorder=0, label="no influence looks so too"
-                )
+            partial = [i.rank if i.partial != i.partial else i.partial for i in found]
+            axes.barh(places + 0.19, [i.share for i in found], 0.36, color=BLUE, label="share of the spread explained")
+            axes.barh(places - 0.19, partial, 0.36, color=ORANGE, label="partial rank correlation")
+            for place, i in zip(places, found, strict=True):
+                for at, low, high in (
+                    (place + 0.19, 0.0, i.share_noise),
+                    (place - 0.19, -i.partial_noise, i.partial_noise),
+                ):
+                    axes.plot([low, high], [at, at], color=REFERENCE, linewidth=3.0, alpha=0.45, label="_")
             axes.set_yticks(places, [i.setting for i in found])
-            axes.set(xlim=(-1.0, 1.0), xlabel="partial rank correlation", title=TITLES[name])
+            axes.set(xlim=(-1.0, 1.0), title=TITLES[name])
         handles, labels = figure.axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=3)
 
     note = (
-        "Bars to the right: more of the setting, more error. The orange bars catch what hurts to both sides, as wind "
-        "from north and from south does. Within the grey band a setting without influence would lie 19 times of 20."
+        "Blue: the share of the error's spread (by ranks) that a setting explains by itself, whatever the shape. "
+        "Orange: to the right, more of the setting goes with more error, all others held. A setting without influence stays "
+        "within the grey lines 19 times of 20."
     )
     return Plot("sensitivity", "What the errors depend on", note, (11.0, 1.6 + 0.42 * min(rows, _SHOWN)), draw)
 
@@ -126,6 +138,7 @@ def _scatter(r: Results, found: list[Influence]) -> Plot:
                     lost, np.full(lost.size, 1.15 * most), s=18, marker="x", color=VERMILION, label="not completed"
                 )
             axes.set(xlabel=name, yscale="log")
+            _plainly(axes.yaxis)
         for axes in figure.axes[::3]:
             axes.set_ylabel("greatest error [m]")
         if not done.all():

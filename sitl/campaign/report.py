@@ -145,12 +145,13 @@ def _sensitivity(ranking: dict[str, list[Influence]]) -> Table:
         cells = []
         for found in by_name.values():
             i = found.get(setting)
-            values = (i.rank, i.partial, i.middle, i.middle_partial) if i else (None,) * 4
-            cells += [Cell("—") if v is None or v != v else Cell(number(v, 2, signed=True), v) for v in values]
+            values = (i.share, i.rank, i.partial) if i else (None,) * 3
+            cells += [Cell("—") if v is None or v != v else Cell(number(v, 2, signed=k > 0), v)
+                      for k, v in enumerate(values)]  # fmt: skip
         rows.append(Row(setting, cells))
-    columns = ("rank", "partial", "to both sides", "partial")
+    columns = ("share explained", "rank correlation", "partial")
     groups = [Group(title, columns) for title in ("mean error in space", "greatest error in space")]
-    return Table("influence", "Rank correlations with the settings", groups, rows)
+    return Table("influence", "What the errors go with", groups, rows)
 
 
 def _levels(name: str, levels: list[dict[str, Any]]) -> Table:

@@ -33,8 +33,8 @@ FIGURES = (
     *_axes("rms", "root mean square error of the true position"),
     *_axes("max", "greatest error of the true position"),
     Column("max_tilt_deg", "float64", "deg", "", "largest angle of the nose from straight up"),
-    Column("energy_J", "float64", "J", "", "drawn from the battery from switching on to the last stop"),
-    Column("duration_s", "float64", "s", "", "of the measured flight"),
+    Column("energy_J", "float64", "J", "", "energy drawn from the battery, from switching on to the last stop"),
+    Column("duration_s", "float64", "s", "", "duration of the measured flight"),
 )
 LIMITED = tuple(c.name for c in FIGURES)  # what a campaign's `success` may limit
 HEAD = (

@@ -2,13 +2,15 @@
 
 import math
 from statistics import NormalDist
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 CONFIDENCE = 0.95
+_LEAST = 5  # flights, below which nothing is told of influences
+_BINS, _IN_BIN = 20, 10  # at most, and flights in each at least
 _QUANTILE = NormalDist().inv_cdf(0.5 + CONFIDENCE / 2.0)
 
 
@@ -53,24 +55,25 @@ def spread(values: Array) -> dict[str, float]:
 
 
 class Influence(NamedTuple):
-    """How a figure goes with a setting, by ranks, −1 … 1.
+    """How a figure goes with a setting, by ranks.
 
-    rank: Spearman's correlation. middle: the same of the setting's distance from its median, for what grows to both
-    sides. partial, middle_partial: what is left of each once all other settings' share is taken away; NaN where
-    there are too few flights for it. noise: of a setting that has no influence 95 of 100 are smaller.
+    rank: Spearman's correlation, −1 … 1. partial: what is left of it once all other settings' share is taken away; NaN
+    where there are too few flights for it. share: of the figure's spread, what the setting explains by itself whatever
+    the shape (the correlation ratio η² over bins of like many flights, adjusted for their number), 0 … 1.
+    partial_noise, share_noise: of a setting without influence 95 of 100 are smaller.
     """
 
     setting: str
     rank: float
-    middle: float
     partial: float
-    middle_partial: float
-    noise: float
+    share: float
+    partial_noise: float
+    share_noise: float
 
     @property
     def size(self) -> float:
-        known = [abs(v) for v in (self.partial, self.middle_partial) if not math.isnan(v)]
-        return max(known or [abs(self.rank), abs(self.middle)])
+        """Of the figure's spread, the part that goes with it by either measure."""
+        return max(self.share, (self.rank if math.isnan(self.partial) else self.partial) ** 2)
 
 
 def influences(settings: dict[str, Array], figure: Array) -> list[Influence]:
@@ -79,41 +82,52 @@ def influences(settings: dict[str, Array], figure: Array) -> list[Influence]:
 
     known = np.isfinite(figure)
     n = int(known.sum())
-    varied = {name: v[known] for name, v in settings.items() if np.unique(v[known]).size > 1}
-    if n < 5 or not varied or np.unique(figure[known]).size < 2:
+    varied = {name: rankdata(v[known]) for name, v in settings.items() if np.unique(v[known]).size > 1}
+    if n < _LEAST or not varied or np.unique(figure[known]).size < 2:
         return []
     y = rankdata(figure[known])
-    straight = {name: rankdata(v) for name, v in varied.items()}
-    middle = {name: rankdata(np.abs(v - np.median(v))) for name, v in varied.items()}
-    features = {("straight", k): v for k, v in straight.items()} | {("middle", k): v for k, v in middle.items()}
-    features = {key: v for key, v in features.items() if np.unique(v).size > 1}
-    left_over = n - len(features) - 2
+    left_over = n - len(varied) - 2
     noise = min(1.0, _QUANTILE / math.sqrt(max(1, left_over)))
-    found = [
-        Influence(
-            name,
-            _correlation(straight[name], y),
-            _correlation(middle[name], y) if ("middle", name) in features else 0.0,
-            _partial(features, ("straight", name), y) if left_over > 0 else math.nan,
-            _partial(features, ("middle", name), y) if left_over > 0 else math.nan,
-            noise,
-        )
-        for name in varied
-    ]
+    found = []
+    for name, x in varied.items():
+        partial = _partial(varied, name, y) if left_over > 0 else math.nan
+        share, share_noise = _share(x, y)
+        found.append(Influence(name, _correlation(x, y), partial, share, noise, share_noise))
     return sorted(found, key=lambda i: -i.size)
+
+
+def _share(x: Array, y: Array) -> tuple[float, float]:
+    """η² of y over bins of x, adjusted, and what it stays below 95 times of 100 without influence."""
+    from scipy.stats import f
+
+    values, n = np.unique(x), x.size
+    count = min(values.size, _BINS, max(2, n // _IN_BIN))
+    # by rank: each bin has as many, and equal values are in one
+    bins = np.minimum(((x - 0.5) * count / n).astype(int), count - 1)
+    used = np.unique(bins)
+    if used.size < 2 or n <= used.size:
+        return 0.0, 1.0
+    between = sum(float((bins == k).sum()) * float(y[bins == k].mean() - y.mean()) ** 2 for k in used)
+    whole = float(((y - y.mean()) ** 2).sum())
+    free, rest = used.size - 1, n - used.size
+    least = float(f.ppf(CONFIDENCE, free, rest)) * free
+    return _adjusted(between / whole, n, rest), _adjusted(least / (least + rest), n, rest)
+
+
+def _adjusted(share: float, n: int, rest: int) -> float:
+    """Ezekiel's: without influence it is 0 on average, however many bins there are."""
+    return max(0.0, 1.0 - (1.0 - share) * (n - 1) / rest)
 
 
 def _correlation(x: Array, y: Array) -> float:
     return float(np.corrcoef(x, y)[0, 1])
 
 
-def _partial(features: dict[Any, Array], key: Any, y: Array) -> float:
-    """Correlation of what linear regression on all other features leaves of x and y; 0 where it leaves nothing."""
-    if key not in features:
-        return 0.0
-    others = np.column_stack([np.ones_like(y), *(v for k, v in features.items() if k != key)])
+def _partial(ranks: dict[str, Array], name: str, y: Array) -> float:
+    """Correlation of what linear regression on all other settings leaves of x and y; 0 where it leaves nothing."""
+    others = np.column_stack([np.ones_like(y), *(v for k, v in ranks.items() if k != name)])
     left = []
-    for v in (features[key], y):
+    for v in (ranks[name], y):
         solution, *_ = np.linalg.lstsq(others, v, rcond=None)
         left.append(v - others @ solution)
     sizes = [float(np.linalg.norm(v)) for v in left]

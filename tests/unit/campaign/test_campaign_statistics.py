@@ -21,19 +21,34 @@ def test_a_spread_leaves_out_what_is_not_finite() -> None:
     assert spread(np.array([np.nan])) == {}
 
 
-def test_influences_are_ranked_and_what_hurts_to_both_sides_is_found() -> None:
+def test_influences_are_ranked_whatever_their_shape() -> None:
     dice = np.random.default_rng(1)
-    slope, valley, nothing = dice.uniform(-1, 1, (3, 400))
-    error = np.exp(0.3 * slope + 2.0 * valley**2 + 0.05 * dice.standard_normal(400))
-    found = influences({"nothing": nothing, "slope": slope, "valley": valley, "same": np.ones(400)}, error)
+    slope, wave, nothing = dice.uniform(-1, 1, (3, 400))
+    error = np.exp(0.3 * slope + np.sin(3.0 * np.pi * wave) + 0.05 * dice.standard_normal(400))
+    found = influences({"nothing": nothing, "slope": slope, "wave": wave, "same": np.ones(400)}, error)
     by_name = {i.setting: i for i in found}
-    assert [i.setting for i in found][2] == "nothing"
-    assert set(by_name) == {"slope", "valley", "nothing"}
+    assert [i.setting for i in found] == ["wave", "slope", "nothing"]
     assert by_name["slope"].rank == pytest.approx(spearmanr(slope, error).statistic)
-    assert by_name["slope"].partial > 0.7 > by_name["slope"].rank
-    assert by_name["valley"].middle_partial > 0.9 > abs(by_name["valley"].partial)
-    assert by_name["nothing"].size < 2.0 * by_name["nothing"].noise
-    assert by_name["nothing"].noise == pytest.approx(0.099, abs=0.001)
+    assert by_name["wave"].share > 0.7 > 0.2 > abs(by_name["wave"].partial) - 0.3
+    assert by_name["slope"].partial > by_name["slope"].partial_noise
+    assert by_name["nothing"].share < by_name["nothing"].share_noise < 0.1
+    assert by_name["nothing"].partial_noise == pytest.approx(0.099, abs=0.001)
+
+
+def test_a_setting_without_influence_stays_below_the_noise_19_times_of_20() -> None:
+    dice = np.random.default_rng(2)
+    found = [influences({"x": dice.uniform(size=200)}, dice.uniform(size=200))[0] for _ in range(300)]
+    assert np.mean([i.share < i.share_noise for i in found]) == pytest.approx(0.95, abs=0.03)
+    assert np.mean([abs(i.partial) < i.partial_noise for i in found]) == pytest.approx(0.95, abs=0.03)
+
+
+def test_partial_correlation_takes_away_what_another_setting_explains() -> None:
+    dice = np.random.default_rng(3)
+    cause = dice.uniform(size=500)
+    companion = cause + 0.1 * dice.uniform(size=500)
+    by_name = {i.setting: i for i in influences({"cause": cause, "companion": companion}, cause**2)}
+    assert by_name["companion"].rank > 0.95
+    assert abs(by_name["companion"].partial) < 0.2 < by_name["cause"].partial
 
 
 def test_too_few_flights_have_no_influence() -> None:
