@@ -102,8 +102,8 @@ def _ranking(ranking: dict[str, list[Influence]]) -> Plot:
 
     note = (
         "Blue: the share of the error's spread (by ranks) that a setting explains by itself, whatever the shape. "
-        "Orange: to the right, more of the setting goes with more error, all others held. A setting without influence stays "
-        "within the grey lines 19 times of 20."
+        "Orange: to the right, more of the setting goes with more error, all others held. A setting without influence "
+        "stays within the grey lines 19 times of 20."
     )
     return Plot("sensitivity", "What the errors depend on", note, (11.0, 1.6 + 0.42 * min(rows, _SHOWN)), draw)
 
