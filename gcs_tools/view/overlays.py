@@ -77,7 +77,7 @@ class Overlays:
         self._ground_down_m = ground_down_m
         self._mission = MissionPath(scene, root, ground_down_m)
         self._name = scene.add_label(
-            f"{root}/air/name", "", font_screen_scale=0.9, anchor="top-center", position=(0.0, 0.0, 0.24)
+            f"{root}/air/name", "", font_screen_scale=0.9, anchor="top-center", position=(0.0, 0.0, 0.24), visible=False
         )
         self._shown = Shown()
         self._added = 0  # rows of the history when the paths were drawn
