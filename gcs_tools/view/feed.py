@@ -89,7 +89,7 @@ class Feed:
     @property
     def status(self) -> Status:
         where = ", ".join(self.endpoints)
-        if not self._connected:
+        if not self._connected and not self._listeners:
             return Status(False, f"Nobody answers at {where}. Trying on: start a vehicle with `sitl run`.")
         if not self._listeners:
             return Status(True, f"Connected to {where}, but no vehicle is there.")
