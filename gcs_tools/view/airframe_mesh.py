@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 
 from gcs_tools.view.solids import Mesh, Points, aerofoil, ball, ellipse, joined, loft, mirrored, spindle
@@ -67,6 +68,20 @@ def dimensions(airframe: Mapping[str, Any]) -> Dimensions:
         nose_m=gear["nose_m"],
         feet_B=feet(gear),
     )
+
+
+def told_or_bundled(description: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The airframe in a vehicle's description; where it lacks numbers that the shape needs, the bundled YawSitter's."""
+    airframe: Mapping[str, Any] = description.get("airframe", {})
+    try:
+        dimensions(airframe)
+        standing_height_m(airframe)
+    except (KeyError, TypeError, ValueError, AttributeError, ZeroDivisionError):
+        from sitl.vehicle_spec import load_vehicle
+
+        bundled: Mapping[str, Any] = msgspec.to_builtins(load_vehicle("yawsitter").airframe.file)
+        return bundled
+    return airframe
 
 
 def standing_height_m(airframe: Mapping[str, Any]) -> float:

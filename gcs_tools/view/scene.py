@@ -77,12 +77,13 @@ class Scene:
         """Put a vehicle into the scene, in place of what was there of it."""
         assert vehicle.description is not None
         assert vehicle.mode is not None
-        d = airframe_mesh.dimensions(vehicle.description["airframe"])
+        told = airframe_mesh.told_or_bundled(vehicle.description)
+        d = airframe_mesh.dimensions(told)
         m = vehicle.mode
         origin = GeoPoint(m.origin_lat_deg, m.origin_lon_deg, m.origin_alt_amsl_m)
         if self._origin is None:
             self._origin = origin
-        ground_down_m = airframe_mesh.standing_height_m(vehicle.description["airframe"])
+        ground_down_m = airframe_mesh.standing_height_m(told)
         if self._ground is None:
             self._ground = self._scene.add_grid(
                 "/ground", infinite_grid=True, plane="xy", cell_size=0.5, section_size=5.0,

@@ -109,3 +109,10 @@ def test_a_blade_that_turns_its_own_way_throws_the_air_aft(side: int) -> None:
     leading = outer[(outer @ moves).argmax()]
     trailing = outer[(outer @ moves).argmin()]
     assert leading[0] > trailing[0]
+
+
+def test_a_vehicle_that_tells_too_little_of_itself_gets_the_bundled_shape() -> None:
+    assert shape.told_or_bundled({"airframe": TOLD}) is TOLD
+    without_chord = {name: value for name, value in TOLD["parameters"].items() if name != "chord_m"}
+    for told in ({}, {"airframe": {**TOLD, "parameters": without_chord}}, {"airframe": {**TOLD, "gear": None}}):
+        assert shape.dimensions(shape.told_or_bundled(told)).chord_m == D.chord_m
