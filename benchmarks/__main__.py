@@ -25,6 +25,7 @@ NAMES = {
     "flood": "20,000 messages a second from one address: heartbeats to another, the loop's deadlines; 1 min",
     "fuzz": "a million hostile datagrams against a hovering vehicle; 4 min, 50,000 with --quick",
     "soak": "30 simulated hours of missions; 10 min, 3 hours with --quick",
+    "swarm": "50 vehicles in one process at 1 × real time: processor time for each, deadlines; 1.5 min",
     "shares": "where the time of a simulated second goes",
 }
 

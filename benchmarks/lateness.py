@@ -34,8 +34,8 @@ FULL_RATE_HZ = 500.0
 class Recorded(Lateness):
     """Lateness that keeps every turn's."""
 
-    def __init__(self) -> None:
-        super().__init__()
+    def __init__(self, turn_s: float = TURN_S) -> None:
+        super().__init__(turn_s)
         self.late_s: list[float] = []
         self.since_s = 0.0
 
@@ -100,16 +100,16 @@ def assembled(config: RunConfig) -> Iterator[Loop]:
 
 def beside(loop: Loop, what: str, subscribed: bool = True) -> Iterator[Figure]:
     """The loop and the bare one in turns; medians and 99th percentiles, and their ratio."""
-    ours, bare = Recorded(), []
+    ours, alone = Recorded(), []
     loop.lateness = ours
     sent = loop.figures().telemetry_messages
     for _ in range(SEGMENTS):
         turn(loop, ours, SEGMENT_S)
-        bare += _bare(SEGMENT_S)
+        alone += bare(SEGMENT_S)
     sent = loop.figures().telemetry_messages - sent
     if subscribed and not sent:
         raise BenchmarkError(f"nothing was sent {what}")
-    p50, p99, bare_p50, bare_p99 = (quantile(v, q) * 1e3 for v in (ours.late_s, bare) for q in (0.5, 0.99))
+    p50, p99, bare_p50, bare_p99 = (quantile(v, q) * 1e3 for v in (ours.late_s, alone) for q in (0.5, 0.99))
     yield told(
         f"lateness p50 / p99, {what}",
         f"{p50:.2f} / {p99:.2f} ms; bare {bare_p50:.2f} / {bare_p99:.2f} ms; ratio {p50 / bare_p50:.1f} / "
@@ -125,12 +125,12 @@ def turn(loop: Loop, record: Recorded, seconds: float) -> None:
     loop.run(lambda: clock() >= begun_s + seconds)
 
 
-def _bare(seconds: float) -> list[float]:
+def bare(seconds: float, turn_s: float = TURN_S) -> list[float]:
     """How late a loop is that does nothing but sleep until the next multiple of the turn."""
     late = []
     begun_s = time.monotonic()
-    for k in range(1, int(seconds / TURN_S)):
-        due_s = begun_s + k * TURN_S
+    for k in range(1, int(seconds / turn_s)):
+        due_s = begun_s + k * turn_s
         left_s = due_s - time.monotonic()
         if left_s > 0.0:
             time.sleep(left_s)

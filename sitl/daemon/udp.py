@@ -26,6 +26,7 @@ class Sockets(Generic[Place]):
     """Bound sockets, each under its place. instance: the first whose ports they are, named where one is in use."""
 
     def __init__(self, addresses: Mapping[Place, Address], instance: int) -> None:
+        self.addresses = dict(addresses)
         self.received = 0
         self.sent = 0
         self.dropped = 0  # datagrams that the system would not take
