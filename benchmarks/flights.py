@@ -11,12 +11,13 @@ from benchmarks.processes import ROOT, BenchmarkError
 from gcs_tools import plan as plans
 from gcs_tools.plan import Streamed, Uploaded
 from gcs_tools.reference import Waypoints
-from sitl.calm_array import calm_array
+from sitl.calm_array import calm_array, put_calm
 from sitl.closed_loop import NOISE_COLUMNS, TRACE_COLUMNS, LoopState
 from sitl.control.guidance import Effort, Guidance
 from sitl.control.reference import DEGREE, Trajectory
 from sitl.loop_arrays import LOOP_SIZE, OBSERVED_SIZE, guidance_array, put_loop, run_in_place, state_of
 from sitl.model.rigid_body import State
+from sitl.onboard.calm import Calm, Ground
 from sitl.onboard.mission import MissionState
 from sitl.onboard.modes import Mode
 from sitl.onboard.offboard import OffboardTarget
@@ -76,7 +77,7 @@ def _trajectory() -> Trajectory:
 def fly_bare(flight: Bare, steps_at_once: int) -> float:
     """AIRBORNE_S of the rectangle in crossings of so many steps, to where it should be then. Returns seconds."""
     random = np.random.Generator(np.random.PCG64(1))
-    none = np.zeros((0, NOISE_COLUMNS))
+    noise = np.zeros((0, NOISE_COLUMNS))
     loop, seen = np.zeros(LOOP_SIZE), np.zeros(OBSERVED_SIZE)
     put_loop(loop, flight.loop)
     guidance = guidance_array(flight.guidance)
@@ -84,13 +85,16 @@ def fly_bare(flight: Bare, steps_at_once: int) -> float:
     now_us, left = 0, round(AIRBORNE_S * 1e6) // flight.step_us
     while left > 0:
         steps = min(left, steps_at_once)
-        noise = random.standard_normal((steps, NOISE_COLUMNS)) if flight.noisy else none
-        run_in_place(
+        put_calm(calm, Calm(1 << 52, Ground.NOTHING), int(seen[-1]), math.inf)
+        if flight.noisy and len(noise) < steps:
+            noise = random.standard_normal((steps, NOISE_COLUMNS))
+        run = run_in_place(
             flight.plants, flight.controllers, guidance, loop, noise, now_us, flight.step_us, steps, _NO_TRACE, seen,
             calm, nothing, NOTHING,
         )  # fmt: skip
-        now_us += steps * flight.step_us
-        left -= steps
+        now_us += run * flight.step_us
+        left -= run
+        noise = noise[run:]
     _check(state_of(loop), streamed().reference.at(AIRBORNE_S).position_m)
     return AIRBORNE_S
 

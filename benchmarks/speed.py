@@ -39,7 +39,7 @@ def measure(quick: bool) -> Iterator[Figure]:
         yield at_least(f"vehicle given 50 targets a second, {name}", rates, 500.0, _UNIT)
     for name in VEHICLES:
         rates = _rates(_vehicle, name, _loop_back)
-        yield at_least(f"with MAVLink loop-back, streams and metrics, {name}", rates, 100.0, _UNIT)
+        yield at_least(f"with MAVLink loop-back, streams and metrics, {name}", rates, 200.0, _UNIT)
     rates = _rates(_vehicle, VEHICLES[0], _crowded)
     yield told("the same, all default streams to both ports besides", spread(rates, _UNIT))
 
