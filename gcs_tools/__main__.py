@@ -157,7 +157,7 @@ def parser() -> argparse.ArgumentParser:
     )
     fly.add_argument("mission", type=Path, metavar="MISSION", help="a mission (.yaml) or QGroundControl plan (.plan)")
     fly.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
-    fly.add_argument("--out", type=Path, metavar="DIR", help="write result.json and track.csv here")
+    fly.add_argument("--out", type=Path, metavar="DIR", help="write result.json, track.csv and flight.tlog here")
 
     plan = commands.add_parser(
         "plan",
@@ -173,6 +173,27 @@ def parser() -> argparse.ArgumentParser:
     plan.add_argument(
         "--home", type=_home, metavar="LAT,LON,ALT", help="where the vehicle will stand (the file's own): deg, m AMSL"
     )
+
+    report = commands.add_parser(
+        "report",
+        help="a flight's report from its log",
+        description="A flight's report from its log: tables, plots and events as one HTML page, its numbers as JSON\n"
+        "beside it. Needs no vehicle.",
+        epilog="examples:\n  gcs report flight.tlog\n  gcs report logs/flight.mcap --out reports\n"
+        "  gcs report flight.tlog --mission missions/rectangle.yaml --out rectangle.html",
+        formatter_class=_Raw,
+        allow_abbrev=False,
+    )
+    report.add_argument(
+        "log", type=Path, metavar="LOG", help=".tlog of any ground station or `sitl run --record`, or its .mcap"
+    )
+    report.add_argument("--mission", type=Path, metavar="FILE", help="measure against this mission, which was flown")
+    report.add_argument("--flight", type=int, metavar="N", help="which flight of the log, from 1 (the longest)")
+    report.add_argument("--system", type=_system, metavar="ID", help="which vehicle of the log (the first one heard)")
+    report.add_argument(
+        "--out", type=Path, metavar="DIR|FILE", help="folder, or file ending in .html (LOG.html beside the log)"
+    )
+    report.add_argument("--json", action="store_true", help="print the numbers as one JSON object")
 
     param = commands.add_parser("param", help="list, read, write, save and load parameters", formatter_class=_Raw)
     actions = param.add_subparsers(dest="action", required=True, metavar="ACTION", parser_class=_Parser)

@@ -1,5 +1,6 @@
 """`gcs fly`: a plan flown over UDP by a vehicle that runs somewhere else."""
 
+import contextlib
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -11,6 +12,7 @@ from gcs_tools.impairment import GOOD, Impairment
 from gcs_tools.link import Connection, UdpLink
 from gcs_tools.plan import Plan
 from gcs_tools.progress import Progress
+from gcs_tools.tlog_writer import TlogWriter
 from sitl.mavlink.signing import Signer
 
 
@@ -34,7 +36,11 @@ def fly(
     client = Client(system, signer)
     flight = Flight(plan, client)
     fault: LinkError | None = None
-    with UdpLink(connection, impairment) as link:
+    with contextlib.ExitStack() as stack:
+        tap = None
+        if out is not None:
+            tap = TlogWriter(stack.enter_context((out / "flight.tlog").open("wb"))).take
+        link = stack.enter_context(UdpLink(connection, impairment, tap))
         try:
             with Progress(flight, quiet=as_json) as progress:
 

@@ -59,7 +59,11 @@ def signer(key: bytes) -> Signer:
 class UdpLink:
     """One socket between a Client and its vehicle (or a Fleet and its), and what is to go wrong on the way."""
 
-    def __init__(self, connection: Connection, impairment: Impairment = GOOD) -> None:
+    def __init__(
+        self, connection: Connection, impairment: Impairment = GOOD, tap: Callable[[bytes, float], None] | None = None
+    ) -> None:
+        """tap: sees what the client hears and says, with the time of day [s since 1970]."""
+        self._tap = tap
         where = f"{connection.host}:{connection.port}"
         self.peer: Address | None = None  # once called, or heard
         self._in: Wire[tuple[bytes, Address]]
@@ -99,12 +103,16 @@ class UdpLink:
                 continue  # nobody listens there (yet)
             self._in.put(now_s(), (data, address))
         for data, address in self._in.take(now_s()):
+            if self._tap is not None:
+                self._tap(data, time.time())
             if client.receive(data, now_s()):
                 self.peer = address
 
     def flush(self, client: Client | Fleet) -> None:
         """Send what the client has to say now. What nobody has been heard for is dropped."""
         for data in client.poll(now_s()):
+            if self._tap is not None:
+                self._tap(data, time.time())
             self._out.put(now_s(), data)
         for data in self._out.take(now_s()):
             if self.peer is not None:

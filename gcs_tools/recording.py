@@ -15,7 +15,7 @@ class Recording:
         self.positions: list[tuple[float, float, float, float]] = []
         self.targets: list[tuple[float, float, float, float]] = []
         self.angles: list[tuple[float, float, float, float]] = []
-        self.thrust: list[tuple[float, float]] = []
+        self.thrust: list[tuple[float, float | None]] = []
         self.flaps: list[tuple[float, float, float]] = []
 
     def position(self, m: Any) -> None:
@@ -35,12 +35,12 @@ class Recording:
 
     def track(self, t0_s: float, reference: Reference | None) -> Track:
         """The flight with times from t0_s. Without a reference of our own it is the one the vehicle reported."""
-        position = _series(self.positions, 4, t0_s)
+        position = series(self.positions, 4, t0_s)
         t = position[:, 0]
         if reference is not None:
             wanted = np.array([reference.at(float(s)).position_m for s in t]).reshape(-1, 3)
         else:
-            target = _series(self.targets, 4, t0_s)
+            target = series(self.targets, 4, t0_s)
             if target.shape[0] == 0:
                 target = np.full((1, 4), np.nan)
             wanted = np.column_stack([np.interp(t, target[:, 0], target[:, k]) for k in (1, 2, 3)])
@@ -48,13 +48,13 @@ class Recording:
             t_s=t,
             reference_m=wanted,
             position_m=position[:, 1:],
-            angles=_series(self.angles, 4, t0_s),
-            thrust=_series(self.thrust, 2, t0_s),
-            flaps=_series(self.flaps, 3, t0_s),
+            angles=series(self.angles, 4, t0_s),
+            thrust=series(self.thrust, 2, t0_s),
+            flaps=series(self.flaps, 3, t0_s),
         )
 
 
-def _series(rows: list[Any], width: int, t0_s: float) -> Any:
+def series(rows: list[Any], width: int, t0_s: float) -> Any:
     """Rows in the order of their times, each time once: datagrams may arrive twice or in another order."""
     table = np.array(rows, dtype=float).reshape(-1, width)
     _, first = np.unique(table[:, 0], return_index=True)

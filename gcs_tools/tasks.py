@@ -171,6 +171,12 @@ def _view(args: argparse.Namespace) -> None:
     view(args)
 
 
+def _report(args: argparse.Namespace) -> None:
+    from gcs_tools.report import main
+
+    main.run(args)
+
+
 def _say(make: Callable[[argparse.Namespace, Client], Script[str]]) -> Callable[[argparse.Namespace], None]:
     """A command whose script returns what to print."""
     return lambda args: print(_converse(args, lambda client: make(args, client)))
@@ -192,6 +198,7 @@ _TASKS: dict[str, Callable[[argparse.Namespace], None]] = {
     "watch": _watch,
     "view": _view,
     "tune": _tune,
+    "report": _report,
     "arm": _say(lambda args, client: commands.arm(client, force=args.force)),
     "disarm": _say(lambda args, client: commands.disarm(client, force=args.force)),
     "takeoff": _say(lambda args, client: commands.takeoff(client, height_m=args.height, wait=args.wait)),

@@ -39,10 +39,10 @@ class Plot(NamedTuple):
 class Drawn(NamedTuple):
     plot: Plot
     svg: bytes
-    png: bytes
+    png: bytes  # empty where it wasn't asked for
 
 
-def drawn(plot: Plot) -> Drawn:
+def drawn(plot: Plot, *, png: bool = True) -> Drawn:
     """The figure in both formats. Needs matplotlib, which is asked for here and nowhere sooner."""
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -52,10 +52,11 @@ def drawn(plot: Plot) -> Drawn:
         figure = Figure(figsize=plot.size_in, layout="constrained")
         FigureCanvasAgg(figure)
         plot.draw(figure)
-        svg, png = io.BytesIO(), io.BytesIO()
-        figure.savefig(svg, format="svg", metadata={"Date": None})
-        figure.savefig(png, format="png", metadata={"Software": None})
-    return Drawn(plot, svg.getvalue(), png.getvalue())
+        vectors, pixels = io.BytesIO(), io.BytesIO()
+        figure.savefig(vectors, format="svg", metadata={"Date": None})
+        if png:
+            figure.savefig(pixels, format="png", metadata={"Software": None})
+    return Drawn(plot, vectors.getvalue(), pixels.getvalue())
 
 
 _LEGEND_WIDTH = 100  # characters that fit beside each other above the widest figure

@@ -66,7 +66,8 @@ def _anchor(title: str) -> str:
     return title.lower().replace(" ", "-")
 
 
-def table(t: Table, remarks: Sequence[str] = ()) -> str:
+def table(t: Table, remarks: Sequence[str] = (), look: str = "") -> str:
+    """look: `words` for cells that are text."""
     starts, at = set(), 0
     for group in t.groups:
         starts.add(at)
@@ -78,11 +79,17 @@ def table(t: Table, remarks: Sequence[str] = ()) -> str:
         for i, c in enumerate(g.columns)
     )
     top = f"<tr><th></th>{head}</tr>" if any(g.title for g in t.groups) else ""
+    kind = f' class="{look}"' if look else ""
     return (
-        f'<h3 id="{t.key}">{escape(t.title)}</h3>\n<div class="scroll"><table>\n<thead>{top}'
+        f'<h3 id="{t.key}">{escape(t.title)}</h3>\n<div class="scroll"><table{kind}>\n<thead>{top}'
         f"<tr><th></th>{columns}</tr></thead>\n<tbody>\n{''.join(_row(row, starts, at) for row in t.rows)}"
         f"</tbody></table></div>\n{notes(remarks)}"
     )
+
+
+def beside(parts: Sequence[str]) -> str:
+    """Beside each other as far as there is room."""
+    return f'<div class="beside">{"".join(f"<div>{part}</div>" for part in parts)}</div>'
 
 
 def _row(row: Row, starts: set[int], width: int) -> str:

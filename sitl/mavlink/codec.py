@@ -19,7 +19,18 @@ from pymavlink.dialects.v20 import development as mav
 from sitl.mavlink.dialect import ADDITIONS, Definition, Field, split_extensions
 from sitl.mavlink.signing import SIGNATURE_BYTES, Signer
 
-__all__ = ["Definition", "Encoder", "Frame", "Parser", "by_id", "by_name", "mav", "message"]
+__all__ = [
+    "Definition",
+    "Encoder",
+    "Frame",
+    "Parser",
+    "by_id",
+    "by_name",
+    "frame_length",
+    "mav",
+    "message",
+    "open_frame",
+]
 
 _V1, _V2 = 0xFE, 0xFD
 _SIGNED = 0x01  # incompatibility flag: a signature follows the checksum
@@ -140,11 +151,11 @@ class Parser:
         frames: list[Frame] = []
         position, end = 0, len(data)
         while position < end:
-            total = _frame_length(data, position)
+            total = frame_length(data, position)
             if not total or position + total > end:
                 break
             raw = data if total == end else data[position : position + total]
-            frame = _open(raw)
+            frame = open_frame(raw)
             if frame is None:
                 break
             if frame.message is not None:
@@ -176,13 +187,13 @@ class Parser:
             if item.get_type() == "BAD_DATA":
                 self.errors += 1
                 continue
-            frame = _open(bytes(item.get_msgbuf()))
+            frame = open_frame(bytes(item.get_msgbuf()))
             if frame is not None and frame.message is not None:
                 frames.append(frame)
         return frames
 
 
-def _frame_length(data: bytes, position: int) -> int:
+def frame_length(data: bytes, position: int) -> int:
     """Bytes of the frame that starts at `position`, 0 where none does."""
     magic = data[position]
     if magic == _V2 and position + 3 <= len(data):
@@ -193,7 +204,7 @@ def _frame_length(data: bytes, position: int) -> int:
     return 0
 
 
-def _open(raw: bytes) -> Frame | None:
+def open_frame(raw: bytes) -> Frame | None:
     """The frame in exactly these bytes: None if the checksum is wrong, without message if its id is unknown."""
     if raw[0] == _V2:
         length, _, _, number, system, component, low, high = _HEAD_V2.unpack_from(raw, 1)

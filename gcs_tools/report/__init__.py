@@ -1,0 +1,1 @@
+"""A flight's report from its log: read, measured, told in tables and figures."""
