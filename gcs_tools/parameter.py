@@ -25,7 +25,7 @@ class Parameter(NamedTuple):
 
 def is_hash(m: Any) -> bool:
     """Whether a PARAM_VALUE is the checksum over all parameters, which is none itself."""
-    return m.param_index == NOT_IN_LIST and m.param_id.startswith("_")
+    return bool(m.param_index == NOT_IN_LIST and m.param_id.startswith("_"))
 
 
 def number_text(value: float) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 
 from gcs_tools import metrics
 from gcs_tools.metrics import Metrics
-from gcs_tools.params import number_text
+from gcs_tools.parameter import number_text
 from gcs_tools.plan import Plan
 from gcs_tools.report.link_quality import Source
 from gcs_tools.report.log import Log

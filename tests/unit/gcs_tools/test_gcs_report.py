@@ -1,5 +1,6 @@
 """Logs read and measured, whole and broken, and the report that comes of them."""
 
+import itertools
 import json
 import math
 import random
@@ -114,7 +115,7 @@ def test_after_a_restart_the_time_goes_on(tmp_path: Path) -> None:
     assert second[0] - first[0] == pytest.approx(15.0, abs=0.1)  # as on the wall
     positions = log.reported.track(0.0, None).t_s
     assert len(positions) == 200
-    assert all(b > a for a, b in zip(positions, positions[1:], strict=False))
+    assert all(b > a for a, b in itertools.pairwise(positions))
 
 
 def test_of_several_vehicles_the_first_one_is_told_unless_another_is_asked_for(tmp_path: Path) -> None:
