@@ -58,7 +58,9 @@ def _messages(data: bytes, damage: list[str]) -> Iterator[tuple[str, int, bytes]
     from mcap.exceptions import McapError
     from mcap.records import Channel, DataEnd, Message
     from mcap.stream_reader import StreamReader
+    from zstandard import ZstdError
 
+    broken = (McapError, ZstdError, EOFError, LookupError, ValueError, RuntimeError, MemoryError, OverflowError)
     stream = io.BytesIO(data)
     channels: dict[int, str] = {}
     complete = False
@@ -70,7 +72,7 @@ def _messages(data: bytes, damage: list[str]) -> Iterator[tuple[str, int, bytes]
                 channels[record.id] = record.topic
             elif isinstance(record, DataEnd):
                 complete = True
-    except (McapError, EOFError, LookupError, ValueError, RuntimeError, MemoryError, OverflowError, struct.error) as e:
+    except (*broken, struct.error) as e:
         if not complete:
             why = str(e) or type(e).__name__
             damage.append(f"read up to byte {stream.tell()} of {len(data)}, there it is broken or cut off: {why}")

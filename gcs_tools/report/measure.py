@@ -131,9 +131,12 @@ def _aligned(log: Log, plan: Streamed, begin_s: float, end_s: float) -> tuple[fl
     grid = np.arange(0.0, plan.duration_s + 0.02, 0.02)
     wanted = np.array([plan.reference.at(float(t)).position_m for t in grid])
 
+    # laid over its edge alone, standing on the ground, any mission fits
+    least = max(10, round(0.5 * len(told) * min(1.0, plan.duration_s / float(told[-1, 0] - told[0, 0]))))
+
     def apart(t0_s: float) -> float:
         inside = (told[:, 0] >= t0_s) & (told[:, 0] <= t0_s + plan.duration_s)
-        if np.count_nonzero(inside) < 10:
+        if np.count_nonzero(inside) < least:
             return math.inf
         at = told[inside, 0] - t0_s
         there = np.column_stack([np.interp(at, grid, wanted[:, k]) for k in range(3)])
