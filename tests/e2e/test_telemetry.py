@@ -305,3 +305,14 @@ def test_a_zenoh_port_in_use_is_one_line_and_status_2(daemon, client, tmp_path) 
     (line,) = done.stderr.splitlines()
     assert daemon.zenoh_endpoint in line
     assert "--no-zenoh" in line
+
+
+def test_the_examples_subscriber_prints_where_the_vehicle_is(daemon, client) -> None:
+    example = [sys.executable, "examples/zenoh_subscriber.py", daemon.zenoh_endpoint, str(daemon.instance), "3"]
+    done = subprocess.run(example, cwd=ROOT, capture_output=True, text=True, timeout=30)
+    assert done.returncode == 0, done.stderr
+    poses = [[float(number) for number in re.findall(r"-?\d+\.\d+", line)] for line in done.stdout.splitlines()]
+    assert len(poses) == 3
+    for _, north, east, down, *q in poses:
+        assert (north, east, down) == pytest.approx((0.0, 0.0, 0.0), abs=0.01)
+        assert sum(x * x for x in q) == pytest.approx(1.0, abs=5e-3)
