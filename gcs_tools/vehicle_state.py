@@ -1,5 +1,6 @@
 """What a vehicle has told of itself, as far as the tools look at it."""
 
+import math
 import re
 from collections import deque
 from typing import Any, NamedTuple
@@ -49,6 +50,7 @@ class VehicleState:
         self.landed = 0  # MAV_LANDED_STATE
         self.position_m: Vector | None = None  # north, east, down of the vehicle's origin
         self.velocity_m_s: Vector = (0.0, 0.0, 0.0)
+        self.reference_m: Vector | None = None  # where it is to be now
         self.angles_deg: Vector | None = None  # the paper's φ, θ, ψ
         self.thrust_N: float | None = None
         self.battery = -1  # percent
@@ -68,6 +70,9 @@ class VehicleState:
         self.clock.hear(m.time_boot_ms * 1e-3, wall_s)
         self.position_m = (m.x, m.y, m.z)
         self.velocity_m_s = (m.vx, m.vy, m.vz)
+
+    def position_target_local_ned(self, m: Any, wall_s: float) -> None:
+        self.reference_m = (m.x, m.y, m.z) if math.isfinite(m.x + m.y + m.z) else None
 
     def system_time(self, m: Any, wall_s: float) -> None:
         self.clock.hear(m.time_boot_ms * 1e-3, wall_s)
@@ -129,6 +134,7 @@ class VehicleState:
 HANDLERS = {
     "HEARTBEAT": VehicleState.heartbeat,
     "LOCAL_POSITION_NED": VehicleState.local_position_ned,
+    "POSITION_TARGET_LOCAL_NED": VehicleState.position_target_local_ned,
     "SYSTEM_TIME": VehicleState.system_time,
     "SYS_STATUS": VehicleState.sys_status,
     "EXTENDED_SYS_STATE": VehicleState.extended_sys_state,

@@ -31,6 +31,10 @@ def rows(client: Client) -> list[tuple[str, str]]:
         told.append(("time", f"{v.clock.newest_s:.1f} s, {v.clock.rate:.2f} × real time"))
     if v.position_m is not None:
         told.append(("position", _vector(v.position_m, "m")))
+        if v.reference_m is not None and v.armed:
+            error = tuple(a - b for a, b in zip(v.position_m, v.reference_m, strict=True))
+            told.append(("reference", _vector(v.reference_m, "m")))
+            told.append(("error", f"{_vector(error, 'm')}, {math.hypot(*error):.3f} m in all"))
         told.append(("velocity", _vector(v.velocity_m_s, "m/s")))
     if v.angles_deg is not None:
         told.append(("φ θ ψ", "  ".join(f"{x:7.2f}°" for x in v.angles_deg)))
@@ -39,13 +43,18 @@ def rows(client: Client) -> list[tuple[str, str]]:
     if v.mission_item is not None and v.mode == "mission":
         told.append(("item", str(v.mission_item)))
     if v.battery >= 0:
-        told.append(("battery", f"{v.battery} %"))
+        told.append(("battery", f"{v.battery} % {_bar(v.battery)}"))
     return told
 
 
 def _place(v: VehicleState) -> str:
     where = _LANDED[v.landed] if v.landed < len(_LANDED) else ""
     return f", {where}" if where else ""
+
+
+def _bar(percent: int) -> str:
+    """Ten cells, as many filled as tens of percent."""
+    return "█" * round(percent / 10) + "░" * (10 - round(percent / 10))
 
 
 def _vector(x: tuple[float, float, float], unit: str) -> str:
