@@ -192,13 +192,7 @@ def gone(group: int) -> bool:
 def test_ctrl_c_ends_the_command_and_its_processes_without_a_traceback(campaign: Path) -> None:
     folder = campaign.parent / "stopped"
     command = [sys.executable, "-m", "sitl", "campaign", str(campaign), "--workers", "1", "--out", str(folder)]
-    process = subprocess.Popen(
-        command,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # tests in the background ignore it
-    )
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
     assert process.stderr is not None
     first = process.stderr.readline()
     os.killpg(process.pid, signal.SIGINT)
