@@ -28,8 +28,8 @@ class Recorded(NamedTuple):
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
     folder = tmp_path_factory.mktemp("recorded")
     logs, out = folder / "logs", folder / "flown"
-    wind = ("--wind", "1,0,0", "--gust", "0.2")
-    with Daemon(folder, "--record", str(logs), "--speed", "10", "--vehicle", "yawsitter-real", *wind) as daemon:
+    wind = ("--wind", "1,0,0", "--gust", "0.2", "--set", "COM_OF_LOSS_T=5")
+    with Daemon(folder, "--record", str(logs), "--speed", "3", "--vehicle", "yawsitter-real", *wind) as daemon:
         ground = Client(daemon)
         ground.until_ready()
         ground.close()
