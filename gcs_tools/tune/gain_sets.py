@@ -33,4 +33,6 @@ def write(path: Path, gains: dict[str, float], description: str) -> None:
     for row in dict.fromkeys(name[:-2] for name in GAIN_NAMES):
         p, i, d = (f"{gains[f'{row}_{term}']:.5g}" for term in "PID")
         lines.append(f"  {row + ':':<8}{{P: {p}, I: {i}, D: {d}}}")
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    whole = path.with_name(f".{path.name}.part")  # an interruption leaves the file that was there
+    whole.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    whole.replace(path)
