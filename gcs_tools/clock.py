@@ -3,6 +3,7 @@
 The vehicle's clock is simulation time: it starts at zero, may run at any multiple of real time and may stand still.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 WINDOW_S = 0.5  # of the caller's clock: each window's least delayed stamp is an anchor of the estimate
@@ -70,3 +71,21 @@ class VehicleClock:
     def when(self, vehicle_s: float) -> float:
         """The caller's time at which the vehicle's clock will read vehicle_s, at its present rate."""
         return self._anchor.wall_s + (vehicle_s - self._lift_s - self._anchor.stamp_s) / max(self.rate, 1e-3)
+
+
+class Metronome:
+    """Sends something every `period_s` of the vehicle's time; beats that were missed are not made up for."""
+
+    def __init__(self, clock: VehicleClock, period_s: float) -> None:
+        self._clock, self._period_s = clock, period_s
+        self._next_s = 0.0
+
+    def beat(self, wall_s: float, send: Callable[[float], None]) -> float:
+        """Call `send` with the vehicle's time if it is due; when the next one will be, on the caller's clock."""
+        now_s = self._clock.at(wall_s)
+        if now_s >= self._next_s - 1e-6:
+            send(now_s)
+            self._next_s += self._period_s
+            if self._next_s < now_s:
+                self._next_s = now_s + self._period_s
+        return self._clock.when(self._next_s)

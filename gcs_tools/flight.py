@@ -12,10 +12,12 @@ import math
 from typing import Any
 
 from gcs_tools.client import TRIES, Client, LinkError, Script
+from gcs_tools.clock import Metronome
 from gcs_tools.metrics import Metrics, TooFewSamplesError, Track, evaluate
 from gcs_tools.plan import Plan, Streamed, Uploaded
 from gcs_tools.recording import Recording
 from gcs_tools.reference import Vector
+from gcs_tools.undertaking import Undertaking
 from gcs_tools.upload import hand_over
 from sitl.mavlink import codec
 from sitl.mavlink.codec import mav
@@ -70,37 +72,25 @@ UNWANTED = (
 )
 
 
-class Flight:
-    """One flight of a plan by the vehicle at the other end of `client`.
-
-    `phase`, `t_s` and `progress` tell how far it is; `notes` what happened, to be taken out by whoever shows it.
-    """
+class Flight(Undertaking):
+    """One flight of a plan by the vehicle at the other end of `client`."""
 
     def __init__(self, plan: Plan, client: Client) -> None:
-        self.plan, self.client = plan, client
-        self.phase = "connecting"
-        self.notes: list[str] = []
+        super().__init__(client)
+        self.plan = plan
         self.recording = Recording()
-        self.t0_s: float | None = None  # start of the flight on the vehicle's clock
         self.measured_s: float | None = None  # how long it lasted, once it has been flown
         self.wall_s: tuple[float, float] = (0.0, 0.0)  # the caller's time at its start and at its end
         self.reached: list[tuple[float, Vector | None]] = []  # when items were reached, and where they are
         self._wanted = _WANTED | (_WANTED_UPLOADED if isinstance(plan, Uploaded) else {})
-        self._next_target_s = 0.0
+        self._metronome = Metronome(client.vehicle.clock, STREAM_S)
         self._last_reached: int | None = None
         client.on["LOCAL_POSITION_NED"] = self.recording.position
         client.on["POSITION_TARGET_LOCAL_NED"] = self.recording.target
         client.on["DEBUG_VECT"] = self.recording.debug
-        client.on["STATUSTEXT"] = self._told
         client.start(self._script())
 
     # What the outside sees.
-
-    @property
-    def t_s(self) -> float:
-        """Vehicle time since the start of the flight; negative before it."""
-        newest = self.client.vehicle.clock.newest_s
-        return newest - self.t0_s if newest is not None and self.t0_s is not None else -math.inf
 
     @property
     def progress(self) -> float:
@@ -274,13 +264,11 @@ class Flight:
 
     def _stream(self) -> float:
         """Send the target that is due; when the next one will be, on the caller's clock."""
-        client = self.client
-        clock = client.vehicle.clock
-        now_s = clock.at(client.wall_s)
-        if now_s < self._next_target_s - 1e-6:
-            return clock.when(self._next_target_s)
+        return self._metronome.beat(self.client.wall_s, self._send_target)
+
+    def _send_target(self, now_s: float) -> None:
+        client, plan = self.client, self.plan
         stamp_ms = round(now_s * 1000.0)
-        plan = self.plan
         assert isinstance(plan, Streamed)
         t = stamp_ms * 1e-3 - self.t0_s if self.t0_s is not None else -1.0
         position, velocity, acceleration = plan.reference.at(t)
@@ -301,10 +289,6 @@ class Flight:
                 mav.MAV_FRAME_LOCAL_NED,
             ),
         )
-        self._next_target_s += STREAM_S
-        if self._next_target_s < now_s:
-            self._next_target_s = now_s + STREAM_S
-        return clock.when(self._next_target_s)
 
     def _item_reached(self, m: Any) -> None:
         if self.t0_s is None or not isinstance(self.plan, Uploaded) or m.seq >= len(self.plan.items):
@@ -326,12 +310,3 @@ class Flight:
         became = "disarmed" if not v.armed else f"left {mode} mode for {v.mode}"
         reason = v.reasons_since(self.client.wall_s - 3.0)
         return f"the vehicle {became} at t = {self.t_s:.1f} s{': ' + reason if reason else ''}"
-
-    def _told(self, m: Any) -> None:
-        texts = self.client.vehicle.texts
-        if m.severity <= mav.MAV_SEVERITY_WARNING and texts:
-            self._note(f"vehicle says: {texts[-1].text}")
-
-    def _note(self, text: str) -> None:
-        t = self.t_s
-        self.notes.append(f"t = {t:.1f} s: {text}" if math.isfinite(t) else text)

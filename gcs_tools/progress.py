@@ -3,31 +3,17 @@
 import math
 import sys
 from types import TracebackType
-from typing import Any, Protocol
+from typing import Any
 
-from gcs_tools.client import Client
+from gcs_tools.undertaking import Undertaking
 
 REDRAW_S = 0.1
-
-
-class Shown(Protocol):
-    """What flights and experiments tell of themselves. progress: 0 to 1. notes: to be taken out by whoever shows it."""
-
-    client: Client
-    phase: str
-    notes: list[str]
-
-    @property
-    def t_s(self) -> float: ...
-
-    @property
-    def progress(self) -> float: ...
 
 
 class Progress:
     """Shows one flight; give it the chance to by calling `update` often (it draws ten times a second at most)."""
 
-    def __init__(self, flight: Shown, *, quiet: bool = False) -> None:
+    def __init__(self, flight: Undertaking, *, quiet: bool = False) -> None:
         self._flight, self._quiet = flight, quiet
         self._live = not quiet and sys.stderr.isatty()
         self._bar: Any = None
@@ -76,7 +62,7 @@ class Progress:
                 print(note, file=sys.stderr)
 
 
-def _where(flight: Shown) -> str:
+def _where(flight: Undertaking) -> str:
     v = flight.client.vehicle
     if v.position_m is None or not math.isfinite(flight.t_s):
         return ""

@@ -20,8 +20,8 @@ from gcs_tools.tune import recorder, targets
 from gcs_tools.tune.loops import GAIN_NAMES, Excitation, Loop
 from gcs_tools.tune.pilot import ATTITUDE, FAR_M, LostError, Pilot
 from gcs_tools.tune.recorder import Recorder, Taken
+from gcs_tools.undertaking import Undertaking
 from sitl.frames import body_quaternion
-from sitl.mavlink.codec import mav
 from sitl.quaternion import Quat
 
 HEIGHT_M = 10.0  # above where it stood, if the experiment has to take off
@@ -49,8 +49,8 @@ class Trial(NamedTuple):
     fault: str
 
 
-class Experiment:
-    """`phase`, `t_s`, `progress` and `notes` are for whoever shows it, as a Flight's.
+class Experiment(Undertaking):
+    """Steps or doublets on one loop, one set of gains after the other; its time starts when the vehicle attends to it.
 
     full_rate_us: interval of the streams that are recorded. land: whether it ends on the ground, or just ends.
     """
@@ -67,10 +67,9 @@ class Experiment:
         full_rate_us: int = FULL_RATE_US,
         land: bool = True,
     ) -> None:
-        self.client, self.loop, self.excitation, self.sets, self.repeat = client, loop, excitation, sets, repeat
+        super().__init__(client)
+        self.loop, self.excitation, self.sets, self.repeat = loop, excitation, sets, repeat
         self._height_m, self._full_rate_us, self._lands = height_m, full_rate_us, land
-        self.phase = "connecting"
-        self.notes: list[str] = []
         self.trials: list[Trial] = []
         self.own: dict[str, float] = {}  # the vehicle's gains before anything was written
         self.written = False  # whether others may be in force
@@ -78,8 +77,6 @@ class Experiment:
         self._recorder = Recorder(client, loop)
         self._pilot = Pilot(client, self._note)
         self._hover: tuple[Quat, float] = ((1.0, 0.0, 0.0, 0.0), 0.0)  # attitude and thrust that hold the place
-        self._start_s: float | None = None
-        client.on["STATUSTEXT"] = self._told
         targets.load_kernels()
 
     # What the outside sees.
@@ -91,12 +88,6 @@ class Experiment:
     @property
     def progress(self) -> float:
         return self._done / max(1, len(self.sets) * self.repeat)
-
-    @property
-    def t_s(self) -> float:
-        """Vehicle time since the script has the vehicle's attention; negative infinity before."""
-        newest = self.client.vehicle.clock.newest_s
-        return newest - self._start_s if newest is not None and self._start_s is not None else -math.inf
 
     def script(self) -> Script[None]:
         client, pilot = self.client, self._pilot
@@ -117,7 +108,7 @@ class Experiment:
         if missing:
             raise LinkError(f"the vehicle has no {missing[0]}: it isn't one whose gains these are")
         self.own = {name: found[name].value for name in GAIN_NAMES}
-        self._start_s = pilot.now_s
+        self.t0_s = pilot.now_s
         self.phase = "climbing"
         yield from pilot.go_up(self._height_m, self._descent_m())
         for gain_set in self.sets:
@@ -249,12 +240,3 @@ class Experiment:
     def _back_in_force(self) -> None:
         self.written = False
         self._note("the vehicle's own gains are back in force")
-
-    def _told(self, m: Any) -> None:
-        texts = self.client.vehicle.texts
-        if m.severity <= mav.MAV_SEVERITY_WARNING and texts:
-            self._note(f"vehicle says: {texts[-1].text}")
-
-    def _note(self, text: str) -> None:
-        t = self.t_s
-        self.notes.append(f"t = {t:.1f} s: {text}" if math.isfinite(t) else text)

@@ -9,6 +9,7 @@ from contextlib import closing
 from typing import Any
 
 from gcs_tools.client import Client, LinkError, Script
+from gcs_tools.clock import Metronome
 from gcs_tools.flight import ARMING_PATIENCE_S, LANDING_S, STREAM_S, WARM_UP_S
 from gcs_tools.reference import TimedPoint, Vector, Waypoints
 from gcs_tools.tune import targets
@@ -40,7 +41,7 @@ class Pilot:
         self.q: Quat | None = None  # the newest attitude heard, q_NB
         self.target: Callable[[int], Any] | None = None
         self.took_off = False
-        self._next_target_s = 0.0
+        self._metronome = Metronome(client.vehicle.clock, STREAM_S)
         other = client.on.get(ATTITUDE)
 
         def heard(m: Any) -> None:
@@ -192,14 +193,8 @@ class Pilot:
 
     def _stream(self) -> float:
         """Send the target that is due; when the next one will be, on the caller's clock."""
-        client = self.client
-        clock = client.vehicle.clock
-        now_s = clock.at(client.wall_s)
-        if now_s < self._next_target_s - 1e-6:
-            return clock.when(self._next_target_s)
+        return self._metronome.beat(self.client.wall_s, self._send_target)
+
+    def _send_target(self, now_s: float) -> None:
         if self.target is not None:
-            client.send(self.target(round(now_s * 1000.0)))
-        self._next_target_s += STREAM_S
-        if self._next_target_s < now_s:
-            self._next_target_s = now_s + STREAM_S
-        return clock.when(self._next_target_s)
+            self.client.send(self.target(round(now_s * 1000.0)))
