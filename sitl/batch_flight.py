@@ -26,6 +26,7 @@ from gcs_tools.plan import FRAME_MISSION, Item, Plan, Streamed, Uploaded
 from gcs_tools.reference import ZERO, TimedPoint, Waypoints
 from sitl import tally
 from sitl.closed_loop import TRACE_COLUMNS
+from sitl.mavlink.wire import float32
 from sitl.onboard.mission import MissionState
 from sitl.onboard.modes import ACCEPTED, EventKind, Mode, Outcome, Severity, Verdict
 from sitl.onboard.offboard import Foreseen, OffboardTarget
@@ -257,28 +258,23 @@ def _course(plan: Streamed, start_s: float, first_us: int, last_us: int) -> _Cou
     targets = [np.ravel(plan.reference.at(now_us // 1000 * 1e-3 - start_s)) for now_us in stamps_us.tolist()]
     singles = np.array(targets, dtype=np.float32).astype(np.float64)
     wanted = np.array(targets)[stamps_us >= round(start_s * 1e6), :3]
-    heading = math.nan if plan.heading_rad is None else _single(plan.heading_rad)
+    heading = math.nan if plan.heading_rad is None else float32(plan.heading_rad)
     return _Course(stamps_us, singles, heading, wanted)
 
 
-def _single(value: float) -> float:
-    """As it arrives at the other end of the wire, which carries single precision."""
-    return float(np.float32(value))
-
-
 def _singles(v: Vec3) -> Vec3:
-    return _single(v[0]), _single(v[1]), _single(v[2])
+    return float32(v[0]), float32(v[1]), float32(v[2])
 
 
 def _target(plan: Streamed, now_us: int, start_s: float) -> OffboardTarget:
     """The target for this instant; before the start is known it is that of standing."""
     t = -1.0 if math.isnan(start_s) else now_us // 1000 * 1e-3 - start_s
     position, velocity, acceleration = map(_singles, plan.reference.at(t))
-    heading = math.nan if plan.heading_rad is None else _single(plan.heading_rad)
+    heading = math.nan if plan.heading_rad is None else float32(plan.heading_rad)
     return OffboardTarget(now_us, position, velocity, acceleration, heading)
 
 
 def _stored(item: Item, first: bool) -> MissionItem:
     """The item as the vehicle stores it when it comes over the link."""
-    p1, p2, p3, p4, z = map(_single, (item.param1, item.param2, item.param3, item.param4, item.z))
+    p1, p2, p3, p4, z = map(float32, (item.param1, item.param2, item.param3, item.param4, item.z))
     return MissionItem(item.frame, item.command, int(first), item.autocontinue, p1, p2, p3, p4, item.x, item.y, z)
