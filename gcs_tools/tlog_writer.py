@@ -1,12 +1,10 @@
-"""What passes over a link as a .tlog: each MAVLink frame behind its wall time (8 bytes, µs since 1970, big-endian)."""
+"""What passes over a link, kept as a .tlog."""
 
-import struct
 from collections.abc import Iterator
 from typing import BinaryIO
 
 from sitl.mavlink.codec import frame_length
-
-STAMP = struct.Struct(">Q")
+from sitl.mavlink.tlog import stamped
 
 
 class TlogWriter:
@@ -16,9 +14,8 @@ class TlogWriter:
         self._file = file
 
     def take(self, datagram: bytes, unix_s: float) -> None:
-        stamp = STAMP.pack(int(unix_s * 1e6))
         for frame in whole_frames(datagram):
-            self._file.write(stamp + frame)
+            self._file.write(stamped(frame, unix_s))
 
 
 def whole_frames(datagram: bytes) -> Iterator[bytes]:

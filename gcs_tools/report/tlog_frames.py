@@ -1,13 +1,13 @@
-"""The frames in a .tlog, however broken: each behind the wall time at which it passed (8 bytes, µs, big-endian)."""
+"""The frames in a .tlog, however broken, each with the wall time at which it passed."""
 
 import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from gcs_tools.tlog_writer import STAMP
 from sitl.mavlink import codec
 from sitl.mavlink.codec import Frame
+from sitl.mavlink.tlog import STAMP
 from sitl.strict_yaml import ConfigError
 
 _YEARS_US = range(946_684_800_000_000, 4_102_444_800_000_000)  # 2000 to 2100: what a stamp can be

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from sitl.daemon.config import SettingError
+from sitl.mavlink.tlog import stamped
 
 if TYPE_CHECKING:
     import numpy as np
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 HEAD = struct.Struct("<cI")  # what follows, and how many bytes of it
-STAMP = struct.Struct(">Q")  # of a frame in a .tlog: µs since 1970
 MESSAGE = struct.Struct("<BQ")  # number of the topic, simulation time [µs]
 BEGIN, FRAME, STEPS, TOPIC, END = b"B", b"F", b"S", b"M", b"E"
 
@@ -101,19 +101,19 @@ class Recorder:
         self.flight = f"{stamp}Z_instance-{self.instance}"
         self.steps_seen = self.steps_kept = 0
         self._put(BEGIN, Flight(self.flight, self.instance, unix_s, now_us, origin).pack())
-        for stamped in self._before:
-            self._put(FRAME, stamped)
+        for entry in self._before:
+            self._put(FRAME, entry)
         self._before.clear()
         self._before_bytes = 0
 
     def frame(self, frame: bytes, unix_s: float) -> None:
         """A MAVLink frame that passes; between flights the last ones are remembered."""
-        stamped = STAMP.pack(int(unix_s * 1e6)) + frame
+        entry = stamped(frame, unix_s)
         if self.flight is not None:
-            self._put(FRAME, stamped)
+            self._put(FRAME, entry)
             return
-        self._before.append(stamped)
-        self._before_bytes += len(stamped)
+        self._before.append(entry)
+        self._before_bytes += len(entry)
         while self._before_bytes > BEFORE_BYTES:
             self._before_bytes -= len(self._before.popleft())
 

@@ -22,8 +22,9 @@ from sitl.daemon import flight_writer
 from sitl.daemon.config import SettingError
 from sitl.daemon.flight_recorder import FlightRecorder
 from sitl.daemon.flight_writer import FlightFiles, make_room, schema, write
-from sitl.daemon.recorder import BACKLOG_MAX, BEFORE_BYTES, BEGIN, FRAME, HEAD, STAMP, STEPS, Flight, Recorder
+from sitl.daemon.recorder import BACKLOG_MAX, BEFORE_BYTES, BEGIN, FRAME, HEAD, STEPS, Flight, Recorder
 from sitl.mavlink.codec import Encoder, message
+from sitl.mavlink.tlog import STAMP
 from sitl.telemetry import messages
 from sitl.telemetry.feed import Feed
 from sitl.vehicle import Vehicle, load_vehicle
