@@ -5,6 +5,7 @@ from pathlib import Path
 from gcs_tools import parameter_files
 from gcs_tools.tune.experiment import GainSet
 from gcs_tools.tune.loops import GAIN_NAMES
+from sitl.atomic import atomically
 from sitl.strict_yaml import ConfigError
 from sitl.vehicle_spec import gains_named
 
@@ -33,6 +34,5 @@ def write(path: Path, gains: dict[str, float], description: str) -> None:
     for row in dict.fromkeys(name[:-2] for name in GAIN_NAMES):
         p, i, d = (f"{gains[f'{row}_{term}']:.5g}" for term in "PID")
         lines.append(f"  {row + ':':<8}{{P: {p}, I: {i}, D: {d}}}")
-    whole = path.with_name(f".{path.name}.part")  # an interruption leaves the file that was there
-    whole.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    whole.replace(path)
+    text = "\n".join(lines) + "\n"
+    atomically(path, lambda to: to.write_text(text, encoding="utf-8"))

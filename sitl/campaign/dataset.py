@@ -6,12 +6,12 @@ import shlex
 from pathlib import Path
 from typing import Any
 
+from sitl.atomic import atomically
 from sitl.campaign import file, store
 from sitl.campaign.card import card
 from sitl.campaign.file import Campaign
 from sitl.campaign.main import answered
 from sitl.campaign.run import RECORD, Plan, fly, need, plan
-from sitl.campaign.store import atomically
 from sitl.campaign.summary import finite
 from sitl.strict_yaml import ConfigError
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from sitl import page
+from sitl.atomic import atomically
 from sitl.campaign import store
 from sitl.campaign.file import Campaign
 from sitl.campaign.plots import all_plots
@@ -39,8 +40,8 @@ def write(folder: Path, campaign: Campaign, record: dict[str, Any]) -> dict[str,
     sections.append(("Campaign", f"<pre>{escape(campaign.document.text)}</pre>\n{page.notes(_made(record))}"))
     html = page.document(campaign.name, _first(summary), sections)
     text = json.dumps(finite(summary), indent=1, ensure_ascii=False) + "\n"
-    store.atomically(folder / "summary.json", lambda to: to.write_text(text, encoding="utf-8"))
-    store.atomically(folder / "report.html", lambda to: to.write_text(html, encoding="utf-8"))
+    atomically(folder / "summary.json", lambda to: to.write_text(text, encoding="utf-8"))
+    atomically(folder / "report.html", lambda to: to.write_text(html, encoding="utf-8"))
     return dict(finite(summary))
 
 

@@ -11,12 +11,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from gcs_tools import results as folders
+from sitl.atomic import atomically
 from sitl.campaign.cases import Case, Equipment, cases, digest, equip
 from sitl.campaign.file import Campaign
 from sitl.campaign.flight import Flight, Job, fingerprint
 from sitl.campaign.progress import Progress
 from sitl.campaign.results import FIGURES, HEAD, TAIL, TRACE, Column, schema, setting_column
-from sitl.campaign.store import Store, atomically
+from sitl.campaign.store import Store
 from sitl.campaign.workers import local
 from sitl.strict_yaml import ConfigError
 

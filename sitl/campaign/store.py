@@ -9,29 +9,16 @@ A part that isn't complete yet is written too, every few seconds and when the ca
 again when more of it has been flown. In the end every file's bytes depend on the flights alone.
 """
 
-import contextlib
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from sitl.atomic import atomically
 from sitl.campaign.flight import Flight
 from sitl.campaign.results import TRACE
 
 FLIGHTS, TRACES, MCAP = "flights", "traces", "mcap"
 _CODEC = "zstd"
-
-
-def atomically(path: Path, write: Callable[[Path], object]) -> None:
-    """Let `write` fill a file beside `path` which then takes its place."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        write(part)
-        part.replace(path)
-    finally:
-        with contextlib.suppress(OSError):
-            part.unlink()
 
 
 class Store:
