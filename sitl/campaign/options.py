@@ -1,8 +1,9 @@
 """The options of `sitl campaign` and `sitl dataset`. Light: nothing is imported that flies."""
 
 import argparse
-from collections.abc import Callable
 from pathlib import Path
+
+from sitl.options import Command
 
 CAMPAIGN = """\
 Fly a mission many times: Monte Carlo, grids, Latin hypercubes and Sobol sequences over wind, seeds, parameters, the
@@ -48,8 +49,6 @@ exit status: as 'sitl campaign'.
 _HELP_DATASET = "fly episodes of state, reference, action and wind for learning"
 _HELP_CAMPAIGN = "fly a mission many times, vary what you like, and report"
 
-Command = Callable[[str, str, str, str], argparse.ArgumentParser]
-
 
 def _whole(text: str) -> int:
     try:
@@ -79,7 +78,7 @@ def _add_workers(parser: argparse.ArgumentParser) -> None:
 
 
 def add(command: Command) -> None:
-    """Add the commands; `command` makes a parser of name, help, description and examples."""
+    """Add both commands."""
     campaign = command("campaign", _HELP_CAMPAIGN, CAMPAIGN, CAMPAIGN_EXAMPLES)
     campaign.add_argument("campaign", type=Path, nargs="?", metavar="CAMPAIGN", help="the campaign's file (.yaml)")
     _add_workers(campaign)
