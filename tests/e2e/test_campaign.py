@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from short_mission import HOP
 
 from gcs_tools.plan import Streamed
 from gcs_tools.reference import Setpoint
@@ -25,15 +26,6 @@ from sitl.campaign.store import table
 
 pytestmark = pytest.mark.compiled
 
-HOP = """\
-name: hop
-kind: waypoints
-duration_s: 6
-waypoints:
-  - {t_s: 0, at_m: [0, 0, 0]}
-  - {t_s: 2.5, at_m: [0, 0, -1]}
-  - {t_s: 5, at_m: [0.3, 0, 0]}
-"""
 CAMPAIGN = """\
 name: hops
 mission: hop.yaml

@@ -9,6 +9,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
 from mcap.reader import make_reader
+from short_mission import HOP
 
 from sitl import __main__ as command_line
 from sitl.campaign.run import split
@@ -16,15 +17,6 @@ from sitl.campaign.store import table
 
 pytestmark = pytest.mark.compiled
 
-HOP = """\
-name: hop
-kind: waypoints
-duration_s: 6
-waypoints:
-  - {t_s: 0, at_m: [0, 0, 0]}
-  - {t_s: 2.5, at_m: [0, 0, -1]}
-  - {t_s: 5, at_m: [0.3, 0, 0]}
-"""
 SPLITS = {"train": 8, "validation": 1, "test": 1}
 
 
