@@ -81,9 +81,9 @@ def test_the_tlog_of_the_same_flight_says_the_same_and_knows_the_link(recorded: 
 
 
 def test_gcs_flys_own_record_tells_its_flight_and_how_bad_the_link_was(recorded: Recorded) -> None:
-    told = report(recorded.own)
+    told = report(recorded.own, "--mission", str(MISSION))
     assert told["facts"]["vehicle"] == "yawsitter-real"
-    assert told["reported"]["mae"] == pytest.approx(recorded.result["mae"], rel=0.2, abs=3e-3)
+    assert told["reported"]["mae"] == pytest.approx(recorded.result["mae"], rel=0.05, abs=1e-3)
     vehicle, client = told["link"]["senders"]
     assert vehicle["loss"] == pytest.approx(LOSS, rel=0.4)
     assert client["system"] == 252
