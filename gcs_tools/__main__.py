@@ -30,6 +30,7 @@ examples:
 exit status: 0 done, 1 the vehicle refused or was lost, 2 the request itself can't be used, 130 interrupted.
 """
 
+_MISSION = "a mission: .yaml, .plan (QGroundControl) or .waypoints (QGC WPL)"
 _SIGNING = "sign with this key: 32 bytes, or 64 hexadecimal digits"
 MODES = ("position", "takeoff", "hold", "mission", "return", "land", "offboard")
 
@@ -155,7 +156,7 @@ def parser() -> argparse.ArgumentParser:
         "  gcs fly missions/circle.yaml --connect udpin:127.0.0.1:14540 --json\n"
         "  gcs fly field.plan --out out/field",
     )
-    fly.add_argument("mission", type=Path, metavar="MISSION", help="a mission (.yaml) or QGroundControl plan (.plan)")
+    fly.add_argument("mission", type=Path, metavar="MISSION", help=_MISSION)
     fly.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     fly.add_argument("--out", type=Path, metavar="DIR", help="write result.json, track.csv and flight.tlog here")
 

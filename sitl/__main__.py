@@ -59,6 +59,7 @@ exit status: 0 when the report is written, 1 when a flight failed, 2 for setting
 """
 
 _HELP_FLY = "fly a mission in one process and print the error table"
+_MISSION = "a mission: .yaml, .plan (QGroundControl) or .waypoints (QGC WPL)"
 _HELP_TRIM = "find hover or level-flight trim"
 _HELP_REPRODUCE = "fly the paper's evaluation and write a report"
 
@@ -103,7 +104,7 @@ def _parser() -> argparse.ArgumentParser:
     daemon.add(command)
 
     fly = command("fly", _HELP_FLY, FLY, FLY_EXAMPLES)
-    fly.add_argument("mission", type=Path, metavar="MISSION", help="a mission (.yaml) or QGroundControl plan (.plan)")
+    fly.add_argument("mission", type=Path, metavar="MISSION", help=_MISSION)
     add_vehicle(fly)
     add_simulation(fly, "max")
     for option, whose in (("--plant", "the vehicle that flies"), ("--believed", "what the controller takes it to be")):

@@ -166,11 +166,12 @@ def fly(
 ) -> Flown:
     """Fly a mission as `sitl fly` does, from standing to standing, and return the record.
 
-    mission: a file (.yaml, .plan). vehicle: a bundled name, a YAML file or a loaded one. wind_N, gust_m_s: the
-    air [m/s]. parameters: values for this flight. plant, believed: airframe numbers changed in what flies, and in what
-    its controller takes it to be. controller: called before every control step in the air with the simulation time [s],
-    the navigation state and the reference; what it returns (Actuation, `attitude`, `body_rates`) is flown in place of
-    the cascade's outer part. Raises ConfigError for settings that can't be used, FlightError where the flight fails.
+    mission: a file (.yaml, .plan, .waypoints). vehicle: a bundled name, a YAML file or a loaded one. wind_N,
+    gust_m_s: the air [m/s]. parameters: values for this flight. plant, believed: airframe numbers changed in what
+    flies, and in what its controller takes it to be. controller: called before every control step in the air with the
+    simulation time [s], the navigation state and the reference; what it returns (Actuation, `attitude`, `body_rates`)
+    is flown in place of the cascade's outer part. Raises ConfigError for settings that can't be used, FlightError where
+    the flight fails.
     """
     plan = mission if isinstance(mission, tuple) else plans.load(mission)
     spec = vehicle if isinstance(vehicle, VehicleSpec) else load_vehicle(vehicle)
