@@ -1,16 +1,15 @@
 """An .mcap of `sitl run --record` → a Log: messages of docs/telemetry.md, a set of them for each control step."""
 
 import importlib.util
-import io
 import json
 import math
-import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
 import numpy as np
 
+from gcs_tools.mcap_reader import messages
 from gcs_tools.report import mcap_messages
 from gcs_tools.report.log import Event, Log, Status
 from gcs_tools.vehicle_state import SEVERITIES
@@ -30,14 +29,12 @@ def read(path: Path, data: bytes, system: int | None) -> Log:
     taker = _Taker(log)
     foreign: set[str] = set()
     first_ns = last_ns = 0
-    for key, log_ns, payload in _messages(data, log.damage):
-        root, _, rest = key.partition("/")
-        instance, _, topic = rest.partition("/")
-        take = _TAKERS.get(topic) if root == "yawsitter" and instance.isdecimal() else None
-        if take is None or (system is not None and int(instance) + 1 != system):
+    for key, instance, topic, log_ns, payload in messages(data, log.damage):
+        take = _TAKERS.get(topic)
+        if take is None or instance is None or (system is not None and instance + 1 != system):
             foreign.add(key)
             continue
-        system = int(instance) + 1
+        system = instance + 1
         first_ns, last_ns = first_ns or log_ns, max(last_ns, log_ns)
         try:
             take(taker, payload)
@@ -51,34 +48,6 @@ def read(path: Path, data: bytes, system: int | None) -> Log:
     log.unix_s = first_ns * 1e-9, last_ns * 1e-9
     taker.finish()
     return log
-
-
-def _messages(data: bytes, damage: list[str]) -> Iterator[tuple[str, int, bytes]]:
-    """(key, log time [ns], payload) of each message, in the file's order, as far as the file is sound."""
-    from mcap.exceptions import McapError
-    from mcap.records import Channel, DataEnd, Message
-    from mcap.stream_reader import StreamReader
-    from zstandard import ZstdError
-
-    broken = (McapError, ZstdError, EOFError, LookupError, ValueError, RuntimeError, MemoryError, OverflowError)
-    stream = io.BytesIO(data)
-    channels: dict[int, str] = {}
-    complete = False
-    try:
-        for record in StreamReader(stream, validate_crcs=True).records:
-            if isinstance(record, Message):
-                yield channels[record.channel_id], record.log_time, record.data
-            elif isinstance(record, Channel):
-                channels[record.id] = record.topic
-            elif isinstance(record, DataEnd):
-                complete = True
-    except (*broken, struct.error) as e:
-        if not complete:
-            why = str(e) or type(e).__name__
-            damage.append(f"read up to byte {stream.tell()} of {len(data)}, there it is broken or cut off: {why}")
-        return
-    if not complete:
-        damage.append(f"ends at byte {len(data)} without its end: the writer was stopped")
 
 
 class _Taker:

@@ -4,15 +4,16 @@ The recording holds every control step; fifty a second are kept here, as a vehic
 """
 
 from bisect import bisect_right
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
+from gcs_tools.mcap_reader import messages
 from gcs_tools.view import topics
-from gcs_tools.view.feed import ROOT, Status
+from gcs_tools.view.feed import Status
 from gcs_tools.view.history import Recorded, row
 from gcs_tools.view.vehicle import Instant, Vehicle
 from sitl.strict_yaml import ConfigError
@@ -76,7 +77,10 @@ class Replay:
         """Raises ConfigError for a file that is no recording of a flight."""
         instants: dict[int, dict[int, tuple[int, dict[str, bytes]]]] = {}
         told: dict[int, list[Told]] = {}
-        for instance, topic, log_ns, payload in _messages(path):
+        damage: list[str] = []
+        for _, instance, topic, log_ns, payload in messages(_read(path), damage):
+            if instance is None or topic not in topics.TYPES:
+                continue
             if topic in topics.SAMPLED:
                 taken_ns, parts = instants.setdefault(instance, {}).setdefault(log_ns // SLOT_NS, (log_ns, {}))
                 if log_ns == taken_ns:
@@ -92,6 +96,8 @@ class Replay:
                 except msgspec.DecodeError as error:
                     raise ConfigError(f"{path}: a message that can't be read: {error}") from None
         if not tracks:
+            if damage:
+                raise ConfigError(f"{path}: no recording that can be read: {damage[0]}")
             raise ConfigError(f"{path}: holds no flight of a YawSitter (the .mcap of `sitl run --record` does)")
         replay = cls(path.name, tracks)
         replay.poll(0.0)
@@ -128,6 +134,13 @@ class Replay:
         """Nothing is open."""
 
 
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise ConfigError(f"{path}: {error.strerror}") from None
+
+
 class _Stamp(msgspec.Struct):
     now_us: int = 0
 
@@ -141,26 +154,3 @@ def _now_us(path: Path, payload: bytes) -> int:
         return _stamp.decode(payload).now_us
     except msgspec.DecodeError as error:
         raise ConfigError(f"{path}: a message that can't be read: {error}") from None
-
-
-def _messages(path: Path) -> Iterator[tuple[int, str, int, bytes]]:
-    """(instance, topic, log time [ns], payload) of what the page reads, in the file's order, as far as it goes.
-
-    A file that was cut off, its writer killed say, is read up to there.
-    """
-    from mcap.reader import NonSeekingReader
-
-    begun = False
-    try:
-        with path.open("rb") as file:
-            for _, channel, message in NonSeekingReader(file).iter_messages(log_time_order=False):
-                begun = True
-                root, _, rest = channel.topic.partition("/")
-                instance, _, topic = rest.partition("/")
-                if root == ROOT and instance.isdecimal() and topic in topics.TYPES:
-                    yield int(instance), topic, int(message.log_time), bytes(message.data)
-    except OSError as error:
-        raise ConfigError(f"{path}: {error.strerror}") from None
-    except Exception as error:  # whatever the library meets in a file that is cut off, or none
-        if not begun:
-            raise ConfigError(f"{path}: no recording (.mcap): {error or type(error).__name__}") from None
