@@ -5,8 +5,9 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 READY  := $(VENV)/ready
 TESTED := $(VENV)/ready-to-test
+COMPUTED := $(VENV)/computed-tests.txt
 
-.PHONY: run test bench docs setup clean
+.PHONY: run test test-flown test-computed bench docs setup clean
 
 run: $(READY)
 	@$(BIN)/python -m gcs_tools.demo
@@ -16,7 +17,16 @@ test: $(TESTED)
 	@$(BIN)/ruff format --check .
 	@$(BIN)/mypy sitl
 	@$(BIN)/lint-imports
-	@$(BIN)/python -m pytest
+	@nice $(MAKE) --no-print-directory test-computed > $(COMPUTED) 2>&1 & computed=$$!; \
+	  $(MAKE) --no-print-directory test-flown; flown=$$?; \
+	  wait $$computed; computed=$$?; cat $(COMPUTED); [ $$flown = 0 ] && [ $$computed = 0 ]
+
+# what flies in real time, and beside it, in the time that leaves, what computes; then once more without compiling
+test-flown: $(TESTED)
+	@$(BIN)/python -m pytest -m e2e
+
+test-computed: $(TESTED)
+	@$(BIN)/python -m pytest -m "not e2e"
 	@NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -m "not e2e and not compiled" tests/unit/model tests/unit/control tests/unit/estimation tests/validation
 
 bench: $(TESTED)
