@@ -193,7 +193,7 @@ def test_nobody_waits_for_a_writer_that_stands_still_and_steps_are_thinned_not_t
             recorder.steps(rows)
             recorder.pump()
             longest = max(longest, time.perf_counter() - start_s)
-        assert longest < 0.5  # it would be for ever
+        assert longest < 5.0  # it would be for ever; anything in between is the machine
         assert len(recorder._backlog) <= BACKLOG_MAX
     finally:
         os.kill(recorder._process.pid, signal.SIGCONT)
