@@ -30,7 +30,7 @@ from sitl.geodesy import GeoPoint
 from sitl.model.derivative import by_cause
 from sitl.model.rigid_body import State
 from sitl.navigation import NavState
-from sitl.telemetry import keys, messages
+from sitl.telemetry import keys, messages, schema
 from sitl.telemetry.keys import Topic
 
 FLIGHTS_MAX = 50  # kept in the folder, the oldest go first
@@ -42,15 +42,15 @@ NICE = 10  # the loop goes first
 
 _NAME = re.compile(r"(\d{4}-\d\d-\d\d_\d\d-\d\d-\d\d-\d{3}Z_instance-\d+)\.(tlog|mcap)")
 _SCHEMAS: dict[Topic, Any] = {
-    keys.STATE: messages.StateMessage,
-    keys.ATTITUDE: messages.AttitudeMessage,
-    keys.SETPOINT: messages.SetpointMessage,
-    keys.ACTUATORS: messages.ActuatorsMessage,
-    keys.LOADS: messages.LoadsMessage,
-    keys.MODE: messages.ModeMessage,
-    keys.EVENT: messages.EventMessage,
-    keys.PARAMETERS: messages.ParametersMessage,
-    keys.MISSION: messages.MissionMessage,
+    keys.STATE: schema.StateMessage,
+    keys.ATTITUDE: schema.AttitudeMessage,
+    keys.SETPOINT: schema.SetpointMessage,
+    keys.ACTUATORS: schema.ActuatorsMessage,
+    keys.LOADS: schema.LoadsMessage,
+    keys.MODE: schema.ModeMessage,
+    keys.EVENT: schema.EventMessage,
+    keys.PARAMETERS: schema.ParametersMessage,
+    keys.MISSION: schema.MissionMessage,
     keys.DESCRIPTION: dict[str, Any],
 }
 
@@ -85,7 +85,7 @@ _STEP_TOPICS: dict[Topic, Callable[[Step], Any]] = {
 }
 
 
-def schema(message: Any) -> dict[str, Any]:
+def json_schema(message: Any) -> dict[str, Any]:
     """A message's JSON schema, in the plain form that viewers know: an object, tuples of one kind as arrays."""
     whole = _plain(msgspec.json.schema(message))
     definitions = whole.pop("$defs", {})
@@ -120,7 +120,7 @@ class FlightFiles:
         self._flush_s = 0.0
 
     def _channel(self, topic: Topic, message: Any) -> int:
-        known = self._mcap.register_schema(topic.name, "jsonschema", msgspec.json.encode(schema(message)))
+        known = self._mcap.register_schema(topic.name, "jsonschema", msgspec.json.encode(json_schema(message)))
         return int(self._mcap.register_channel(keys.key(self._flight.instance, topic), "json", known))
 
     def frame(self, data: bytes) -> None:

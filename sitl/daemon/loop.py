@@ -13,7 +13,7 @@ from sitl.daemon.config import Address
 from sitl.daemon.member import Complaints, Member
 from sitl.daemon.udp import Place, Sockets
 from sitl.mavlink.peers import PortKind
-from sitl.telemetry.messages import LoopMessage
+from sitl.telemetry.schema import LoopMessage
 
 if TYPE_CHECKING:
     from sitl.mavlink.shared import SharedPort

@@ -7,7 +7,7 @@ running at 200 times real time does not flood its listeners. Nothing is built th
 from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
-from sitl.telemetry import keys, messages
+from sitl.telemetry import keys, messages, schema
 from sitl.telemetry.keys import Topic
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ class Frames:
 class Feed:
     """The messages of one vehicle."""
 
-    def __init__(self, vehicle: Subject, instance: int, loop: Callable[[], messages.LoopMessage]) -> None:
+    def __init__(self, vehicle: Subject, instance: int, loop: Callable[[], schema.LoopMessage]) -> None:
         self._vehicle = vehicle
         self._instance = instance
         self._loop = loop
@@ -157,10 +157,10 @@ class Feed:
                 for event in news:
                     yield keys.EVENT, messages.encode(messages.event(event))
 
-    def _mode(self) -> messages.ModeMessage:
+    def _mode(self) -> schema.ModeMessage:
         parameters = self._vehicle.parameters
         return messages.mode(self._vehicle.snapshot(), parameters["SIM_SPEED"], parameters["SIM_PAUSE"] > 0)
 
-    def _events(self) -> messages.EventsMessage:
+    def _events(self) -> schema.EventsMessage:
         log = self._vehicle.events
         return messages.events(log.next_number, log.since(max(0, log.next_number - EVENTS_KEPT)))

@@ -21,11 +21,11 @@ from sitl.closed_loop import TRACE_COLUMNS, traced
 from sitl.daemon import flight_writer
 from sitl.daemon.config import SettingError
 from sitl.daemon.flight_recorder import FlightRecorder
-from sitl.daemon.flight_writer import FlightFiles, make_room, schema, write
+from sitl.daemon.flight_writer import FlightFiles, json_schema, make_room, write
 from sitl.daemon.recorder import BACKLOG_MAX, BEFORE_BYTES, BEGIN, FRAME, HEAD, STEPS, Flight, Recorder
 from sitl.mavlink.codec import Encoder, message
 from sitl.mavlink.tlog import STAMP
-from sitl.telemetry import messages
+from sitl.telemetry import schema
 from sitl.telemetry.feed import Feed
 from sitl.vehicle import Vehicle, load_vehicle
 
@@ -243,9 +243,9 @@ def test_a_flight_that_outgrows_its_file_loses_its_end_not_its_begin(tmp_path, m
     assert 10 < len(state) < 2500
 
 
-@pytest.mark.parametrize("message", [messages.StateMessage, messages.LoadsMessage, messages.ParametersMessage])
+@pytest.mark.parametrize("message", [schema.StateMessage, schema.LoadsMessage, schema.ParametersMessage])
 def test_schemas_are_plain_objects(message) -> None:
-    told = schema(message)
+    told = json_schema(message)
     assert told["type"] == "object"
     assert "prefixItems" not in json.dumps(told)
 

@@ -8,7 +8,7 @@ import pytest
 from sitl.onboard.events import EventLog
 from sitl.onboard.modes import EventKind, Severity
 from sitl.telemetry import feed as feed_module
-from sitl.telemetry import keys, messages
+from sitl.telemetry import keys, schema
 from sitl.telemetry.feed import BURST_S, GATHER_MAX_BYTES, GATHER_S, Feed, Sampler
 
 
@@ -51,7 +51,7 @@ def vehicle(monkeypatch) -> StandIn:
 
 @pytest.fixture
 def feed(vehicle) -> Feed:
-    return Feed(vehicle, 0, lambda: messages.LoopMessage(*(0,) * len(messages.LoopMessage.__struct_fields__)))
+    return Feed(vehicle, 0, lambda: schema.LoopMessage(*(0,) * len(schema.LoopMessage.__struct_fields__)))
 
 
 def everything(_) -> bool:

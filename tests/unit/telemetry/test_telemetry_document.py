@@ -7,21 +7,21 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from sitl.telemetry import keys, messages
+from sitl.telemetry import keys, schema
 
 DOCUMENT = (Path(__file__).resolve().parents[3] / "docs" / "telemetry.md").read_text(encoding="utf-8")
 
 SECTIONS = {
-    "state": messages.StateMessage,
-    "attitude": messages.AttitudeMessage,
-    "setpoint": messages.SetpointMessage,
-    "actuators": messages.ActuatorsMessage,
-    "loads": messages.LoadsMessage,
-    "mode": messages.ModeMessage,
-    "loop": messages.LoopMessage,
-    "event, events": messages.EventMessage,
-    "parameters": messages.ParameterMessage,
-    "mission": messages.MissionMessage,
+    "state": schema.StateMessage,
+    "attitude": schema.AttitudeMessage,
+    "setpoint": schema.SetpointMessage,
+    "actuators": schema.ActuatorsMessage,
+    "loads": schema.LoadsMessage,
+    "mode": schema.ModeMessage,
+    "loop": schema.LoopMessage,
+    "event, events": schema.EventMessage,
+    "parameters": schema.ParameterMessage,
+    "mission": schema.MissionMessage,
 }
 
 

@@ -6,23 +6,23 @@ import pytest
 from gcs_tools.view import topics
 from gcs_tools.view.feed import ROOT, SUBSCRIBED
 from gcs_tools.view.vehicle import Vehicle
-from sitl.telemetry import keys, messages
+from sitl.telemetry import keys, schema
 from sitl.telemetry.feed import Feed
 from sitl.vehicle import Vehicle as Flown
 from sitl.vehicle_spec import load_vehicle
 
 SENT = {
-    "state": messages.StateMessage,
-    "attitude": messages.AttitudeMessage,
-    "setpoint": messages.SetpointMessage,
-    "actuators": messages.ActuatorsMessage,
-    "loads": messages.LoadsMessage,
-    "mode": messages.ModeMessage,
-    "loop": messages.LoopMessage,
-    "event": messages.EventMessage,
-    "events": messages.EventsMessage,
-    "parameters": messages.ParametersMessage,
-    "mission": messages.MissionMessage,
+    "state": schema.StateMessage,
+    "attitude": schema.AttitudeMessage,
+    "setpoint": schema.SetpointMessage,
+    "actuators": schema.ActuatorsMessage,
+    "loads": schema.LoadsMessage,
+    "mode": schema.ModeMessage,
+    "loop": schema.LoopMessage,
+    "event": schema.EventMessage,
+    "events": schema.EventsMessage,
+    "parameters": schema.ParametersMessage,
+    "mission": schema.MissionMessage,
 }
 
 
@@ -45,7 +45,7 @@ def test_the_topics_are_the_vehicle_s_under_its_root() -> None:
 
 def test_a_vehicle_that_stands_is_known_from_its_answers_alone() -> None:
     flown = Flown(load_vehicle("yawsitter"))
-    feed = Feed(flown, 4, lambda: messages.LoopMessage(*(0,) * len(names(messages.LoopMessage))))
+    feed = Feed(flown, 4, lambda: schema.LoopMessage(*(0,) * len(names(schema.LoopMessage))))
     vehicle = Vehicle(4)
     for topic in keys.TOPICS:
         if topic.queryable:
