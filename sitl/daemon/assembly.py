@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from sitl.daemon.boot import Boot
-from sitl.daemon.clock import SWARM_TURN_S, TURN_S
+from sitl.daemon.clock import SLICE_US, SWARM_TURN_S, TURN_S
 from sitl.daemon.config import Place, Port, RunConfig, SettingError, Setup
 from sitl.daemon.files import FolderArea
 from sitl.daemon.flight_recorder import FlightRecorder
@@ -135,16 +135,17 @@ def build_loop(
     A vehicle of several that is told to reboot is built again in its place; a lone one ends the loop.
     """
     swarming = setup.shared is not None
-    profile = Profile(setup.rate_max_Hz, (PortKind.ONBOARD,)) if swarming else FULL
     settings = {config.system_id: config for config in setup.vehicles}
 
     def member(config: RunConfig, vehicle: Vehicle, publisher: Publisher | None) -> Member[Place]:
+        phase_us = (config.instance - setup.first.instance) * SLICE_US  # not all in the same turn
+        profile = Profile(setup.rate_max_Hz, (PortKind.ONBOARD,), phase_us) if swarming else FULL
         endpoint = build_endpoint(config, vehicle, recorder, signer, profile)
         ports = [*config.local_ports, *([Port.SHARED] if swarming else [])]
         places = {PortKind(port.value): setup.place(config, port) for port in ports}
         name = f"system {config.system_id}" if swarming else ""
         made = Member(vehicle, endpoint, places, publisher=publisher, name=name)
-        made.feed = Feed(vehicle, config.instance, lambda: loop.figures(made))
+        made.feed = Feed(vehicle, config.instance, lambda: loop.figures(made), phase_us)
         if recorder is not None:
             made.recorder = FlightRecorder(vehicle, made.feed, recorder)
         return made

@@ -4,7 +4,7 @@ import ipaddress
 import math
 import os
 import socket
-from enum import Enum
+from enum import StrEnum
 from pathlib import Path
 from typing import NamedTuple
 
@@ -28,7 +28,7 @@ Address = tuple[str, int]
 Place = tuple[int, "Port"]  # one of the sockets: the port of this instance
 
 
-class Port(Enum):
+class Port(StrEnum):
     """Whom a socket is for; the values are those of the link's PortKind, which this module is too light to import."""
 
     GCS = "gcs"

@@ -83,6 +83,7 @@ class Endpoint:
         self._handlers = self._table()
         self._news = News(link, self._parameters)
         self._heartbeat_due_s = float("-inf")
+        self._second_beat_s = HEARTBEAT_S - (profile.phase_us or 0) * 1e-6 % HEARTBEAT_S  # after the first
         self._gcs_heard_s: float | None = None
         self._gcs_lost = False
         self._deadline_s = float("-inf")
@@ -332,6 +333,8 @@ class Endpoint:
             self._stream_due_us = 0
             self._tell_refusals(now_s)
             self._beat()
+            late_s = now_s - self._heartbeat_due_s
+            self._heartbeat_due_s = now_s + (HEARTBEAT_S - late_s if late_s < HEARTBEAT_S else self._second_beat_s)
         deadline_s = self._watch_ground_stations(now_s)
         self._missions.advance()
         self._commands.advance()
@@ -342,7 +345,6 @@ class Endpoint:
         self._deadline_s = min(self._heartbeat_due_s, deadline_s, *(service.deadline_s for service in services))
 
     def _beat(self) -> None:
-        self._heartbeat_due_s = self._link.wall_s + HEARTBEAT_S
         self._link.broadcast(vehicle_heartbeat(self._link))
 
     def _tell_refusals(self, now_s: float) -> None:

@@ -56,7 +56,7 @@ class Peer:
         self.speaks_v2 = False
         self.parser = Parser()
         self.streams = not self.static or self.kind not in self._profile.on_hearing
-        self.schedule = Schedule(self.kind, now_us, self._profile.rate_max_Hz)
+        self.schedule = Schedule(self.kind, now_us, self._profile)
         self.listing = Listing()
         self.answers = Answers()
         self.routes: set[tuple[int, int]] = set()  # systems and components behind this address

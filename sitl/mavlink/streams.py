@@ -9,7 +9,7 @@ import heapq
 import math
 import struct
 from collections.abc import Callable, Mapping
-from enum import Enum
+from enum import StrEnum
 from typing import NamedTuple
 
 from sitl.mavlink import messages
@@ -18,11 +18,12 @@ from sitl.mavlink.view import View
 
 NEVER = 1 << 62
 SHORTEST_US = 1000  # between two messages of one stream
+PATIENCE_US = 1_000_000  # a stream with a phase begins within this
 DEFAULT, OFF = 0, -1  # intervals with a meaning of their own in SET_MESSAGE_INTERVAL
 TOTAL_MAX_HZ = 5000.0  # messages that one peer may have streamed in a second of simulation, all streams together
 
 
-class PortKind(Enum):
+class PortKind(StrEnum):
     """One of the vehicle's ports. They differ in the default rates of their streams."""
 
     GCS = "gcs"
@@ -32,10 +33,15 @@ class PortKind(Enum):
 
 
 class Profile(NamedTuple):
-    """How the default rates are cut where many vehicles share a machine; what a peer asks for is not."""
+    """How the default rates are cut where many vehicles share a machine; what a peer asks for is not.
+
+    phase_us: every stream falls so long after the multiples of its interval, so that vehicles with different phases
+    speak at different times; None: it begins at once. Heartbeats keep so far apart, too.
+    """
 
     rate_max_Hz: float = math.inf  # of one stream
     on_hearing: tuple[PortKind, ...] = ()  # ports whose peers get streams only once they have been heard
+    phase_us: int | None = None
 
 
 FULL = Profile()
@@ -138,19 +144,26 @@ _DEFAULT_INTERVALS = {kind: [_interval(stream.rates_Hz.get(kind, 0.0)) for strea
 class Schedule:
     """One peer's streams: a heap of (due, place in STREAMS), so that looking costs only what is due."""
 
-    __slots__ = ("_defaults", "_heap", "intervals_us", "next_us")
+    __slots__ = ("_defaults", "_heap", "_phase_us", "intervals_us", "next_us")
 
-    def __init__(self, kind: PortKind, now_us: int, rate_max_Hz: float = math.inf) -> None:
-        shortest_us = 0 if math.isinf(rate_max_Hz) else round(1e6 / rate_max_Hz)
+    def __init__(self, kind: PortKind, now_us: int, profile: Profile = FULL) -> None:
+        shortest_us = 0 if math.isinf(profile.rate_max_Hz) else round(1e6 / profile.rate_max_Hz)
+        self._phase_us = profile.phase_us
         self._defaults = [max(each, shortest_us) if each > 0 else each for each in _DEFAULT_INTERVALS[kind]]
         self.intervals_us = list(self._defaults)
         self._rebuild(now_us)
 
     def _rebuild(self, now_us: int) -> None:
-        self._heap = [(now_us, k) for k, interval in enumerate(self.intervals_us) if interval > 0]
+        self._heap = [self._first(now_us, k) for k, interval in enumerate(self.intervals_us) if interval > 0]
         self._heap.append((NEVER, -1))
         heapq.heapify(self._heap)
         self.next_us = self._heap[0][0]
+
+    def _first(self, now_us: int, k: int) -> tuple[int, int]:
+        """Of a stream that begins now."""
+        if self._phase_us is None:
+            return now_us, k
+        return now_us + (self._phase_us - now_us) % min(self.intervals_us[k], PATIENCE_US), k
 
     def take(self, now_us: int) -> list[int]:
         """The streams that are due, each once however late, on its own grid from here on."""
@@ -184,7 +197,7 @@ class Schedule:
             return False
         self.intervals_us = intervals_us
         self._heap = [entry for entry in self._heap if entry[1] not in places]
-        self._heap += [(now_us, k) for k in places if intervals_us[k] > 0]
+        self._heap += [self._first(now_us, k) for k in places if intervals_us[k] > 0]
         heapq.heapify(self._heap)
         self.next_us = self._heap[0][0]
         return True

@@ -4,6 +4,7 @@ Sampled topics follow simulation time at SIM_TLM_RATE, and never exceed the same
 running at 200 times real time does not flood its listeners. Nothing is built that nobody listens to.
 """
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -42,12 +43,13 @@ class Subject(Protocol):
 class Sampler:
     """Says when the next sample is due: at most `rate_Hz` per second of simulation, and of wall time."""
 
-    def __init__(self) -> None:
+    def __init__(self, phase_us: int = 0) -> None:
         self._slot = -1
+        self._phase_us = phase_us  # samples fall so long after multiples of their interval
         self._booked_s = float("-inf")
 
     def due(self, now_us: int, wall_s: float, rate_Hz: float) -> bool:
-        slot = int(now_us * rate_Hz / 1e6)
+        slot = math.floor((now_us - self._phase_us) * rate_Hz / 1e6)
         if slot == self._slot:
             return False
         booked_s = max(self._booked_s, wall_s)
@@ -81,17 +83,20 @@ class Frames:
 
 
 class Feed:
-    """The messages of one vehicle."""
+    """The messages of one vehicle. phase_us: how long after those of a vehicle without a phase they come."""
 
-    def __init__(self, vehicle: Subject, instance: int, loop: Callable[[], schema.LoopMessage]) -> None:
+    def __init__(
+        self, vehicle: Subject, instance: int, loop: Callable[[], schema.LoopMessage], phase_us: int = 0
+    ) -> None:
         self._vehicle = vehicle
         self._instance = instance
         self._loop = loop
-        self._sampler = Sampler()
+        self._sampler = Sampler(phase_us)
         self._frames = {keys.MAVLINK_OUT: Frames(), keys.MAVLINK_IN: Frames()}
         self._frames_due_s = float("-inf")
         self._trigger: tuple[Any, ...] = ()
         self._repeat_s = float("-inf")
+        self._second_repeat_s = REPEAT_S - phase_us * 1e-6 % REPEAT_S  # after the first
         self._next_event = vehicle.events.next_number
         self._builders: dict[Topic, Callable[[], Any]] = {
             keys.STATE: lambda: messages.state(vehicle.snapshot()),
@@ -137,17 +142,15 @@ class Feed:
     def _changes(self, wall_s: float, wanted: Callable[[Topic], bool]) -> Iterator[tuple[Topic, bytes]]:
         parameters, log = self._vehicle.parameters, self._vehicle.events
         repeat = wall_s >= self._repeat_s
-        trigger = (
-            *messages.mode_trigger(self._vehicle.snapshot()),
-            parameters["SIM_SPEED"],
-            parameters["SIM_PAUSE"],
-        )
-        if repeat or trigger != self._trigger:
-            self._trigger = trigger
-            if wanted(keys.MODE):
+        if wanted(keys.MODE):
+            snapshot = self._vehicle.snapshot()
+            trigger = (*messages.mode_trigger(snapshot), parameters["SIM_SPEED"], parameters["SIM_PAUSE"])
+            if repeat or trigger != self._trigger:
+                self._trigger = trigger
                 yield keys.MODE, self.latest(keys.MODE)
         if repeat:
-            self._repeat_s = wall_s + REPEAT_S
+            late_s = wall_s - self._repeat_s
+            self._repeat_s = wall_s + (REPEAT_S - late_s if late_s < REPEAT_S else self._second_repeat_s)
             if wanted(keys.LOOP):
                 yield keys.LOOP, self.latest(keys.LOOP)
         if log.next_number != self._next_event:

@@ -4,7 +4,7 @@ A key is `yawsitter/<instance>/<topic>`. Everything is sent with congestion cont
 up loses messages, the vehicle loses no time.
 """
 
-from enum import Enum
+from enum import StrEnum
 from typing import NamedTuple
 
 ROOT = "yawsitter"
@@ -12,7 +12,7 @@ JSON = "application/json"
 BYTES = "application/octet-stream"
 
 
-class Cadence(Enum):
+class Cadence(StrEnum):
     SAMPLED = "SIM_TLM_RATE times a second"
     CHANGE = "on every change, and once a second"
     EVENT = "once for each event"

@@ -103,6 +103,21 @@ def test_a_new_rate_holds_from_the_next_sample() -> None:
     )
 
 
+def test_feeds_with_different_phases_never_say_what_is_due_in_the_same_turn(vehicle) -> None:
+    vehicle.parameters["SIM_TLM_RATE"] = 10.0
+    feeds = [Feed(vehicle, k, lambda: {"what": "loop"}, k * 20_000) for k in range(3)]
+    said: list[list[str]] = []
+    for turn in range(200):
+        vehicle.now_us = turn * 20_000
+        for feed in feeds:
+            said.append([name for name in names(feed.due(turn * 0.02, everything)) if name in ("state", "loop")])
+    later = said[100 * len(feeds) :]
+    for name in ("state", "loop"):
+        turns = [{k // 3 for k, heard in enumerate(later) if name in heard and k % 3 == which} for which in range(3)]
+        assert [len(each) for each in turns] == [20 if name == "state" else 2] * 3
+        assert len(set.union(*turns)) == sum(map(len, turns))
+
+
 def test_nothing_is_built_that_nobody_listens_to(feed, vehicle) -> None:
     assert list(feed.due(0.0, nothing)) == []
     assert vehicle.load_requests == 0
