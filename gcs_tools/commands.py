@@ -8,6 +8,7 @@ import math
 from gcs_tools.client import SEEN_S, Client, LinkError, Script
 from gcs_tools.plan import Uploaded
 from gcs_tools.upload import hand_over
+from sitl.mavlink import codec
 from sitl.mavlink.codec import mav
 
 NAN = math.nan
@@ -84,9 +85,19 @@ def mission(client: Client, plan: Uploaded) -> Script[str]:
     """Hand a mission over and start it, from the ground or in the air."""
     yield from client.connect()
     yield from hand_over(client, plan)
-    v = client.vehicle
-    if not v.armed:
+    if not client.vehicle.armed:
         yield from client.arm()
-    yield from client.require("starting the mission", mav.MAV_CMD_MISSION_START, 0.0, 0.0)
-    yield from client.wait(lambda: v.mode == "mission", SEEN_S, "the mission was started but its mode isn't in force")
+    yield from start_mission(client)
     return f"mission {plan.name} under way"
+
+
+def start_mission(client: Client, patience_s: float = 0.0) -> Script[None]:
+    """Start the stored mission and see its mode in force; where that is refused, motors on the ground are stopped."""
+    v = client.vehicle
+    try:
+        yield from client.require("starting the mission", mav.MAV_CMD_MISSION_START, 0.0, 0.0, patience_s=patience_s)
+    except LinkError:
+        disarm = mav.MAV_CMD_COMPONENT_ARM_DISARM
+        client.send(codec.message("COMMAND_LONG", command=disarm, param1=0.0, **client.address()))
+        raise
+    yield from client.wait(lambda: v.mode == "mission", SEEN_S, "the mission was started but its mode isn't in force")

@@ -4,6 +4,7 @@ import math
 from pathlib import Path
 
 from gcs_tools import plan as plans
+from gcs_tools.fence import LEVEL
 from gcs_tools.plan import (
     FRAME_LOCAL_NED,
     FRAME_MISSION,
@@ -33,8 +34,16 @@ def convert(plan: Plan, to: Path, home: Home | None) -> Uploaded:
     home = home or plan.home
     local = to.suffix.lower() in (".yaml", ".yml")
     place = _to_metres if local else _to_degrees
-    items = tuple(place(item, home, f"{plan.source}: item {i}") for i, item in enumerate(plan.items))
-    placed = plan._replace(items=items, home=None if local else home)
+
+    def moved(items: tuple[Item, ...], what: str) -> tuple[Item, ...]:
+        return tuple(place(item, home, f"{plan.source}: {what} {i}") for i, item in enumerate(items))
+
+    placed = plan._replace(
+        items=moved(plan.items, "item"),
+        home=None if local else home,
+        fence=None if plan.fence is None else moved(plan.fence, "fence item"),
+        rally=None if plan.rally is None else moved(plan.rally, "rally point"),
+    )
     text = writer.dumps(placed)
     to.write_text(text, encoding="utf-8")
     return placed
@@ -60,7 +69,7 @@ def _to_metres(item: Item, home: Home | None, where: str) -> Item:
         raise ConfigError(f"{where}: frame: {item.frame} has no metres from home without --home LAT,LON,ALT")
     north, east, down = (round(v, _GRID_M) + 0.0 for v in place)
     x, y = round(north * LOCAL_SCALE), round(east * LOCAL_SCALE)
-    return item._replace(frame=FRAME_LOCAL_NED, x=x, y=y, z=down)
+    return item._replace(frame=FRAME_LOCAL_NED, x=x, y=y, z=0.0 if item.command in LEVEL else down)
 
 
 def _to_degrees(item: Item, home: Home | None, where: str) -> Item:

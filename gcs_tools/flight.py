@@ -11,6 +11,7 @@ with. Uploaded flights hand the items over, start the mission and watch.
 import math
 from typing import Any
 
+from gcs_tools import commands
 from gcs_tools.client import TRIES, Client, LinkError, Script
 from gcs_tools.clock import Metronome
 from gcs_tools.metrics import Metrics, TooFewSamplesError, Track, evaluate
@@ -178,6 +179,7 @@ class Flight(Undertaking):
         if away > START_WITHIN_M:
             place = ", ".join(f"{x:.2f}" for x in v.position_m)
             raise LinkError(f"the vehicle stands at ({place}), {away:.2f} m from where this flight starts")
+        yield from self._hand_over(plan)
         client.background = self._stream
         began_s = v.clock.at(client.wall_s)
         yield from client.wait(
@@ -202,14 +204,12 @@ class Flight(Undertaking):
 
     def _uploaded(self, plan: Uploaded) -> Script[None]:
         client, v = self.client, self.client.vehicle
-        yield from hand_over(client, plan)
-        self._note(f"{len(plan.items)} mission items uploaded")
+        yield from self._hand_over(plan)
         client.on["MISSION_ITEM_REACHED"] = self._item_reached
         yield from client.arm(ARMING_PATIENCE_S)
         self._begin(0.0)
         began_wall_s = client.wall_s
-        yield from client.require("starting the mission", mav.MAV_CMD_MISSION_START, 0.0, 0.0, patience_s=2.0)
-        yield from client.wait(lambda: v.mode == "mission", 3.0, "the mission was started but its mode isn't in force")
+        yield from commands.start_mission(client, patience_s=2.0)
         yield from self._follow(plan)
         self.measured_s = max(self.t_s, STREAM_S)
         self.wall_s = (began_wall_s, client.wall_s)
@@ -217,6 +217,10 @@ class Flight(Undertaking):
         if v.armed:
             yield from self._land()
         self._note("disarmed")
+
+    def _hand_over(self, plan: Plan) -> Script[None]:
+        for text in (yield from hand_over(self.client, plan)):
+            self._note(text)
 
     def _follow(self, plan: Uploaded) -> Script[None]:
         """Until the vehicle has disarmed, or the mission has long been complete."""

@@ -21,6 +21,7 @@ GLOBAL_SCALE = 1e7  # degE7
 GLOBAL_FRAMES = {0: 5, 3: 6, 10: 11, 5: 5, 6: 6, 11: 11}  # any global frame → its _INT form on the wire
 _PLAIN = {5: 0, 6: 3, 11: 10}
 LOCAL_FRAMES = (1, 7)
+_FLOWN_TO = (16, 17, 18, 19, 21, 22, 31, 82, 84, 85)  # commands whose place is a point to fly to
 
 
 class Item(NamedTuple):
@@ -42,6 +43,11 @@ class Item(NamedTuple):
         if self.frame != FRAME_LOCAL_NED or self.command == 20 or not math.isfinite(self.z):
             return None
         return self.x / LOCAL_SCALE, self.y / LOCAL_SCALE, self.z
+
+    @property
+    def flies_to(self) -> bool:
+        """Whether the item's place, if it has one, is a point to fly to."""
+        return self.command in _FLOWN_TO and self.frame != FRAME_MISSION
 
 
 Fault = Callable[[str, str], NoReturn]  # field ("frame", "params[4]"), message
@@ -82,7 +88,11 @@ class Home(NamedTuple):
 
 
 class Streamed(NamedTuple):
-    """A flight of timed offboard targets with feed-forward. The metrics run over duration_s from its start."""
+    """A flight of timed offboard targets with feed-forward. The metrics run over duration_s from its start.
+
+    fence, rally: the items of either kind (MAV_CMD 5000 to 5004, 5100) that go to the vehicle before the flight, () for
+    a vehicle without any; None where the file says nothing of them and the vehicle keeps what it has.
+    """
 
     name: str
     source: str
@@ -91,10 +101,15 @@ class Streamed(NamedTuple):
     key_times_s: tuple[float, ...]
     heading_rad: float | None  # None: keep whatever heading it has
     paper: str | None  # the paper's table to print beside
+    fence: tuple[Item, ...] | None = None
+    rally: tuple[Item, ...] | None = None
 
 
 class Uploaded(NamedTuple):
-    """A flight of mission items. The metrics run from its start to the disarming or the end of the mission."""
+    """A flight of mission items. The metrics run from its start to the disarming or the end of the mission.
+
+    fence, rally: as those of Streamed.
+    """
 
     name: str
     source: str
@@ -102,6 +117,8 @@ class Uploaded(NamedTuple):
     limit_s: float  # simulation time after which the flight counts as stuck
     home: Home | None  # where the file was drawn for
     paper: str | None = None
+    fence: tuple[Item, ...] | None = None
+    rally: tuple[Item, ...] | None = None
 
 
 Plan = Streamed | Uploaded

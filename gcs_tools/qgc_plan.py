@@ -11,11 +11,13 @@ from typing import Annotated, Any, NoReturn
 
 import msgspec
 
+from gcs_tools.fence import CIRCLE, POLYGON, RALLY_POINT, RETURN_POINT
 from gcs_tools.plan import Home, Item, Uploaded, item_of, written
 from sitl import strict_yaml
 from sitl.strict_yaml import ConfigError
 
-FILE_TYPE, FILE_VERSION, MISSION_VERSION = "Plan", 1, 2
+FILE_TYPE, FILE_VERSION, MISSION_VERSION, FENCE_VERSION, SHAPE_VERSION = "Plan", 1, 2, 2, 1
+FRAME_GLOBAL, FRAME_ABOVE_HOME = 0, 3  # MAV_FRAME: as QGroundControl sends a fence's areas, and places with a height
 LIMIT_S = 3600.0
 
 
@@ -35,18 +37,45 @@ class _Mission(msgspec.Struct, rename="camel"):
     planned_home_position: tuple[float, float, float] | None = None
 
 
-class _Shapes(msgspec.Struct):
-    circles: list[Any] = []
-    polygons: list[Any] = []
-    points: list[Any] = []
+_LatLon = tuple[float, float]
+_LatLonAlt = tuple[float, float, float]
+
+
+class _Round(msgspec.Struct):
+    center: _LatLon
+    radius: Annotated[float, msgspec.Meta(gt=0.0, le=100_000.0)]
+
+
+class _Circle(msgspec.Struct):
+    circle: _Round
+    inclusion: bool
+    version: int = SHAPE_VERSION
+
+
+class _Polygon(msgspec.Struct):
+    polygon: Annotated[list[_LatLon], msgspec.Meta(min_length=3, max_length=10_000)]
+    inclusion: bool
+    version: int = SHAPE_VERSION
+
+
+class _Fence(msgspec.Struct, rename="camel"):
+    circles: list[_Circle] = []
+    polygons: list[_Polygon] = []
+    breach_return: _LatLonAlt | None = None
+    version: int = FENCE_VERSION
+
+
+class _Rally(msgspec.Struct):
+    points: list[_LatLonAlt] = []
+    version: int = FENCE_VERSION
 
 
 class _File(msgspec.Struct, rename="camel"):
     file_type: str
     version: int
     mission: _Mission
-    geo_fence: _Shapes = msgspec.field(default_factory=_Shapes)
-    rally_points: _Shapes = msgspec.field(default_factory=_Shapes)
+    geo_fence: _Fence | None = None
+    rally_points: _Rally | None = None
 
 
 class _Source:
@@ -87,18 +116,14 @@ def loads(text: str, name: str) -> Uploaded:
     source.expect("version", data.get("version"), FILE_VERSION)
     plan: _File = source.convert(data, _File)
     source.expect("mission.version", plan.mission.version, MISSION_VERSION)
-    for field, found in (
-        ("geoFence.circles", plan.geo_fence.circles),
-        ("geoFence.polygons", plan.geo_fence.polygons),
-        ("rallyPoints.points", plan.rally_points.points),
-    ):
-        if found:
-            source.fault(field, "fences and rally points can't be flown; allowed: an empty list")
     if not plan.mission.items:
         source.fault("mission.items", "has no items")
     items = tuple(_item(source, raw, f"mission.items[{i}]") for i, raw in enumerate(plan.mission.items))
     home = plan.mission.planned_home_position
-    return Uploaded(PurePath(name).stem, name, items, LIMIT_S, Home(*home) if home else None)
+    fence = _fence_items(source, plan.geo_fence) if plan.geo_fence is not None else None
+    rally = _rally_items(source, plan.rally_points) if plan.rally_points is not None else None
+    place = Home(*home) if home else None
+    return Uploaded(PurePath(name).stem, name, items, LIMIT_S, place, fence=fence, rally=rally)
 
 
 def _item(source: _Source, raw: dict[str, Any], at: str) -> Item:
@@ -113,6 +138,69 @@ def _item(source: _Source, raw: dict[str, Any], at: str) -> Item:
         item.auto_continue,
         lambda field, message: source.fault(f"{at}.{field}", message),
     )
+
+
+def _placed(source: _Source, field: str, frame: int, command: int, p1: float, place: tuple[float, ...]) -> Item:
+    """An item of a fence or a rally point; `field` has the place, of which latitude and longitude 0 are none."""
+
+    def fault(which: str, message: str) -> NoReturn:
+        source.fault(f"{field}[{int(which[7]) - 4}]" if which.startswith("params[") else field, message)
+
+    if place[0] == place[1] == 0.0:
+        fault("", "latitude and longitude 0 are no place")
+    return item_of(frame, command, (p1, 0.0, 0.0, 0.0, *place, 0.0)[:7], True, fault)
+
+
+def _fence_items(source: _Source, fence: _Fence) -> tuple[Item, ...]:
+    """As QGroundControl sends them: polygons, circles, the point to return to."""
+    source.expect("geoFence.version", fence.version, FENCE_VERSION)
+    items = []
+    for i, polygon in enumerate(fence.polygons):
+        at, corners = f"geoFence.polygons[{i}]", polygon.polygon
+        source.expect(f"{at}.version", polygon.version, SHAPE_VERSION)
+        for k, corner in enumerate(corners):
+            where, command = f"{at}.polygon[{k}]", POLYGON[polygon.inclusion]
+            items.append(_placed(source, where, FRAME_GLOBAL, command, float(len(corners)), corner))
+    for i, circle in enumerate(fence.circles):
+        at, drawn = f"geoFence.circles[{i}]", circle.circle
+        source.expect(f"{at}.version", circle.version, SHAPE_VERSION)
+        where, command = f"{at}.circle.center", CIRCLE[circle.inclusion]
+        items.append(_placed(source, where, FRAME_GLOBAL, command, drawn.radius, drawn.center))
+    if fence.breach_return is not None:
+        items.append(_placed(source, "geoFence.breachReturn", FRAME_ABOVE_HOME, RETURN_POINT, 0.0, fence.breach_return))
+    return tuple(items)
+
+
+def _rally_items(source: _Source, rally: _Rally) -> tuple[Item, ...]:
+    source.expect("rallyPoints.version", rally.version, FENCE_VERSION)
+    return tuple(
+        _placed(source, f"rallyPoints.points[{i}]", FRAME_ABOVE_HOME, RALLY_POINT, 0.0, point)
+        for i, point in enumerate(rally.points)
+    )
+
+
+def _shapes(plan: Uploaded) -> dict[str, Any]:
+    """The object `geoFence`. Raises ConfigError for groups, which it has no word for."""
+    circles, polygons, rest = [], [], {}
+    k, items = 0, plan.fence or ()
+    while k < len(items):
+        item = items[k]
+        if item.param2:
+            message = f"group {item.param2:g} can't be written as .plan; allowed: 0"
+            raise ConfigError(f"{plan.source}: fence item {k}: {message}")
+        places = (
+            [written(i)[1][4:] for i in items[k : k + int(item.param1)]] if item.command in POLYGON.values() else []
+        )
+        if places:
+            polygon = {"inclusion": item.command == POLYGON[True], "polygon": [p[:2] for p in places]}
+            polygons.append(polygon | {"version": SHAPE_VERSION})
+        elif item.command == RETURN_POINT:
+            rest = {"breachReturn": written(item)[1][4:]}
+        else:
+            circle = {"center": written(item)[1][4:6], "radius": item.param1}
+            circles.append({"circle": circle, "inclusion": item.command == CIRCLE[True], "version": SHAPE_VERSION})
+        k += len(places) or 1
+    return rest | {"circles": circles, "polygons": polygons, "version": FENCE_VERSION}
 
 
 def dumps(plan: Uploaded) -> str:
@@ -143,10 +231,10 @@ def dumps(plan: Uploaded) -> str:
     }
     whole = {
         "fileType": FILE_TYPE,
-        "geoFence": {"circles": [], "polygons": [], "version": 2},
+        "geoFence": _shapes(plan),
         "groundStation": "QGroundControl",
         "mission": mission,
-        "rallyPoints": {"points": [], "version": 2},
+        "rallyPoints": {"points": [written(i)[1][4:] for i in plan.rally or ()], "version": FENCE_VERSION},
         "version": FILE_VERSION,
     }
     return json.dumps(whole, indent=4) + "\n"

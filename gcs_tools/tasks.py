@@ -11,6 +11,7 @@ from gcs_tools import commands, logs, parameter_files, params
 from gcs_tools.client import Client, LinkError, Script
 from gcs_tools.link import UdpLink, signer
 from sitl.mavlink.signing import Signer
+from sitl.strict_yaml import ConfigError
 
 
 def run(args: argparse.Namespace) -> None:
@@ -63,9 +64,15 @@ def _plan(args: argparse.Namespace) -> None:
     found = plan.load(args.mission)
     if args.to is None:
         timeline.show(found)
+        leaves = timeline.objections(found)
+        if leaves:
+            raise ConfigError(f"{args.mission}: {leaves[0]}")
         return
     written = convert.convert(found, args.to, args.home)
-    print(f"{len(written.items)} items written to {args.to}")
+    counts = [f"{len(written.items)} items"]
+    for name, items in (("fence", written.fence), ("rally points", written.rally)):
+        counts += [f"{len(items)} of the {name}"] if items else []
+    print(f"{', '.join(counts)} written to {args.to}")
 
 
 def _param(args: argparse.Namespace) -> None:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from rich.console import Console
 from rich.markup import escape
 
+from gcs_tools import fence, fence_check
 from gcs_tools.convert import local_m
 from gcs_tools.plan import Home, Plan, Streamed, Uploaded
 from gcs_tools.reference import Vector
@@ -64,9 +65,9 @@ def _uploaded(plan: Uploaded) -> list[Row]:
     t: float | None = 0.0
     speed, found = LIMITS["MPC_XY_CRUISE"], []
     for i, item in enumerate(plan.items):
-        place, way = local_m(item, home), None
+        place, way = local_m(item, home) if item.flies_to else None, None
         if item.command == _RETURNS:
-            place = (0.0, 0.0, 0.0)
+            place = _return_place(plan, home, here)
         elif item.command in _LANDS and place is not None:
             place = (place[0], place[1], 0.0)
         elif item.command in _TAKES_OFF and place is not None and here is not None:
@@ -117,6 +118,17 @@ def _land_s(a: Vector, b: Vector, speed_m_s: float) -> float:
     )
 
 
+def _return_place(plan: Uploaded, home: Home | None, here: Vector | None) -> Vector:
+    """The ground at the nearest of home and the rally points within the fence."""
+    areas, goals = fence_check.areas_of(plan, home), [(0.0, 0.0)]
+    for item in plan.rally or () if here is not None else ():
+        place = local_m(item, home)
+        if place is not None and fence.first_outside(areas, [place[:2]]) is None:
+            goals.append(place[:2])
+    north, east = min(goals, key=lambda goal: math.dist(goal, here[:2]) if here is not None else 0.0)
+    return north, east, 0.0
+
+
 def _first_place(plan: Uploaded) -> Home | None:
     """A plan of latitudes without a home is measured from its first one."""
     for item in plan.items:
@@ -128,6 +140,15 @@ def _first_place(plan: Uploaded) -> Home | None:
 def _name(command: int) -> str:
     known = mav.enums["MAV_CMD"].get(command)
     return known.name.removeprefix("MAV_CMD_") if known is not None else f"command {command}"
+
+
+def objections(plan: Plan) -> list[str]:
+    """What speaks against flying it within its own fence."""
+    if isinstance(plan, Streamed):
+        return [text for text in [fence_check.along_reference(plan)] if text]
+    places = [(f"item {i}", row.place_m) for i, row in enumerate(rows(plan))]
+    way = [("the start", (0.0, 0.0, 0.0)), *((name, place) for name, place in places if place is not None)]
+    return fence_check.along_items(plan, plan.home or _first_place(plan), way)
 
 
 def show(plan: Plan, console: Console | None = None) -> None:
@@ -145,7 +166,30 @@ def show(plan: Plan, console: Console | None = None) -> None:
     length, last = sum(row.way_m or 0.0 for row in found), found[-1].end_s or 0.0
     if isinstance(plan, Streamed):
         console.print(f"{length:.1f} m in {last:.1f} s", highlight=False)
-        return
+    else:
+        _show_limits(plan, length, last, console)
+    _show_fence(plan, console)
+
+
+def _show_limits(plan: Uploaded, length: float, last: float, console: Console) -> None:
     limits = ", ".join(f"{name} {value:g}" for name, value in LIMITS.items())
     stops = "with a stop at each place and the limits that the vehicle comes with"
     console.print(f"{len(plan.items)} items, {length:.1f} m, about {last:.0f} s, {stops} ({limits})", highlight=False)
+
+
+def _show_fence(plan: Plan, console: Console) -> None:
+    """What the file says of fence and rally points, and whether the flight keeps to them."""
+
+    def say(text: str) -> None:
+        console.print(text, markup=False, highlight=False)
+
+    if plan.rally:
+        say(f"{len(plan.rally)} rally point{'s' if len(plan.rally) > 1 else ''}")
+    if not plan.fence:
+        return
+    home = (plan.home or _first_place(plan)) if isinstance(plan, Uploaded) else None
+    areas = fence_check.areas_of(plan, home)
+    say(f"fence of {len(plan.fence)} items: {fence.summary(areas) or 'its places are not known without a home'}")
+    found = objections(plan)
+    for text in found or ["every place and the whole way lie inside"] if areas else []:
+        say(text)

@@ -68,7 +68,11 @@ def _item(row: dict[str, float], where: str) -> Item:
 
 
 def dumps(plan: Uploaded) -> str:
-    """The text of such a file, home in line 0 where the plan has one."""
+    """The text of such a file, home in line 0 where the plan has one. Raises ConfigError for what would be lost."""
+    for name, lost in (("fence", plan.fence), ("rally", plan.rally)):
+        if lost:
+            message = f"would be lost (items: {len(lost)}), {HEADING} has a mission's only; allowed: .plan, .yaml"
+            raise ConfigError(f"{plan.source}: {name}: {message}")
     rows = []
     if plan.home is not None:
         rows.append((1, 0, 16, (0.0, 0.0, 0.0, 0.0, *plan.home), 1))

@@ -8,32 +8,23 @@ from typing import Annotated, Any
 
 import msgspec
 
+from gcs_tools import fence_check, yaml_fence
 from gcs_tools.plan import FRAME_LOCAL_NED, FRAME_MISSION, LOCAL_SCALE, Item, Plan, Streamed, Uploaded
 from gcs_tools.reference import PEAK_ACCELERATION, PEAK_SPEED, Circle, TimedPoint, Waypoints
+from gcs_tools.yaml_types import NAN, Down, Duration, Heading, Height, Instant, Length, Name, Struct, wire_xy
 from sitl.strict_yaml import ConfigError, Document
 
 MAX_SPEED_M_S = 10.0  # far above what the vehicle tracks in hover; beyond it a file is surely mistyped
 MAX_ACCELERATION_M_S2 = 8.0
 
-Length = Annotated[float, msgspec.Meta(ge=-10_000.0, le=10_000.0)]
-Down = Annotated[float, msgspec.Meta(ge=-1000.0, le=0.0)]
-Height = Annotated[float, msgspec.Meta(gt=0.0, le=1000.0)]
-Instant = Annotated[float, msgspec.Meta(ge=0.0, le=36_000.0)]
-Duration = Annotated[float, msgspec.Meta(gt=0.0, le=36_000.0)]
-Heading = Annotated[float, msgspec.Meta(ge=-360.0, le=360.0)]
-Name = Annotated[str, msgspec.Meta(min_length=1, max_length=80)]
-NAN = math.nan
 
-
-class _Struct(msgspec.Struct, forbid_unknown_fields=True):
-    pass
-
-
-class _Head(_Struct, kw_only=True):
+class _Head(Struct, kw_only=True):
     name: Name
     kind: str
     description: str = ""
     paper: str | None = None
+    fence: yaml_fence.Entries | None = None
+    rally: yaml_fence.Entries | None = None
 
 
 class _Timed(_Head, kw_only=True):
@@ -41,7 +32,7 @@ class _Timed(_Head, kw_only=True):
     heading_deg: Heading | None = 0.0
 
 
-class _Point(_Struct, kw_only=True):
+class _Point(Struct, kw_only=True):
     t_s: Instant
     at_m: tuple[Length, Length, Down]
 
@@ -68,13 +59,13 @@ class _Mission(_Head, kw_only=True):
 
 
 # Items of a mission. `do` picks the structure; the functions below it write the wire's fields (MAV_CMD numbers).
-class _Takeoff(_Struct, kw_only=True):
+class _Takeoff(Struct, kw_only=True):
     do: str
     at_m: tuple[Length, Length, Down]
     heading_deg: Heading | None = None
 
 
-class _Waypoint(_Struct, kw_only=True):
+class _Waypoint(Struct, kw_only=True):
     do: str
     at_m: tuple[Length, Length, Down]
     hold_s: Instant = 0.0
@@ -82,22 +73,22 @@ class _Waypoint(_Struct, kw_only=True):
     heading_deg: Heading | None = None
 
 
-class _Land(_Struct, kw_only=True):
+class _Land(Struct, kw_only=True):
     do: str
     at_m: tuple[Length, Length]
     heading_deg: Heading | None = None
 
 
-class _Return(_Struct, kw_only=True):
+class _Return(Struct, kw_only=True):
     do: str
 
 
-class _Speed(_Struct, kw_only=True):
+class _Speed(Struct, kw_only=True):
     do: str
     speed_m_s: Annotated[float, msgspec.Meta(gt=0.0, le=MAX_SPEED_M_S)]
 
 
-class _Delay(_Struct, kw_only=True):
+class _Delay(Struct, kw_only=True):
     do: str
     seconds_s: Duration
 
@@ -105,7 +96,7 @@ class _Delay(_Struct, kw_only=True):
 def _placed(command: int, at_m: tuple[float, ...], heading_deg: float | None, p1: float = 0.0, p2: float = 0.0) -> Item:
     north, east, *down = at_m
     yaw = NAN if heading_deg is None else heading_deg
-    x, y = round(north * LOCAL_SCALE), round(east * LOCAL_SCALE)
+    x, y = wire_xy(north, east)
     return Item(FRAME_LOCAL_NED, command, p1, p2, 0.0, yaw, x, y, down[0] if down else 0.0)
 
 
@@ -191,7 +182,12 @@ def _streamed(file: Document, m: _Timed, reference: Waypoints | Circle, duration
         if t > duration_s:
             file.fault(f"key_times_s[{i}]", f"{t:g} s is after the end; allowed 0 to {duration_s:g} s")
     heading = None if m.heading_deg is None else math.radians(m.heading_deg)
-    return Streamed(m.name, file.name, reference, duration_s, m.key_times_s, heading, m.paper)
+    fence, rally = yaml_fence.read_fence(file, m.fence), yaml_fence.read_rally(file, m.rally)
+    plan = Streamed(m.name, file.name, reference, duration_s, m.key_times_s, heading, m.paper, fence, rally)
+    objection = fence_check.along_reference(plan)
+    if objection:
+        file.fault("fence", objection)
+    return plan
 
 
 def _mission(file: Document, m: _Mission) -> Plan:
@@ -202,7 +198,8 @@ def _mission(file: Document, m: _Mission) -> Plan:
         file.choice(f"items[{i}].do", raw["do"], ITEMS)
         struct, write = ITEMS[raw["do"]]
         items.append(write(file.convert(raw, struct, f"items[{i}]")))
-    return Uploaded(m.name, file.name, tuple(items), m.limit_s, None, m.paper)
+    fence, rally = yaml_fence.read_fence(file, m.fence), yaml_fence.read_rally(file, m.rally)
+    return Uploaded(m.name, file.name, tuple(items), m.limit_s, None, m.paper, fence, rally)
 
 
 KINDS: dict[str, tuple[Any, Any]] = {
@@ -232,7 +229,8 @@ _WRITTEN: dict[int, tuple[str, Callable[[Item], dict[str, Any]]]] = {
 
 def dumps(plan: Uploaded) -> str:
     """The text of a YAML mission. Raises ConfigError, naming item and field, for what these files can't say."""
-    lines = [f"name: {json.dumps(plan.name[:80])}", "kind: mission", f"limit_s: {plan.limit_s:g}", "items:"]
+    lines = [f"name: {json.dumps(plan.name[:80])}", "kind: mission", f"limit_s: {plan.limit_s:g}"]
+    lines += [*yaml_fence.written(plan.fence, plan.rally, plan.source), "items:"]
     for n, item in enumerate(plan.items):
         where = f"{plan.source}: item {n}"
         if item.command not in _WRITTEN:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gcs_tools import lockstep
 from gcs_tools.client import AGAIN_S
+from gcs_tools.fence import CIRCLE, RALLY_POINT
 from gcs_tools.flight import (
     ARMING_PATIENCE_S,
     ELSEWHERE_S,
@@ -22,7 +23,7 @@ from gcs_tools.flight import (
     WARM_UP_S,
 )
 from gcs_tools.lockstep import TURN_US
-from gcs_tools.plan import FRAME_MISSION, Item, Plan, Streamed, Uploaded
+from gcs_tools.plan import FRAME_LOCAL_NED, FRAME_MISSION, Item, Plan, Streamed, Uploaded
 from gcs_tools.reference import ZERO, TimedPoint, Waypoints
 from sitl import tally
 from sitl.closed_loop import TRACE_COLUMNS
@@ -43,8 +44,11 @@ class NotFlownError(RuntimeError):
 
 
 @cache
-def _first_ask_us(uploaded: bool) -> int:
-    """Until then it only listens, and listens equally long in every flight: this flies the beginning of one."""
+def _first_ask_us(uploaded: bool, fence: int | None = None, rally: int | None = None) -> int:
+    """Until then it listens and hands its plans over, equally long in every flight: this flies the beginning of one.
+
+    fence, rally: how many items the plan has of either, None where it says nothing of them.
+    """
     plan: Plan
     if uploaded:
         delay = Item(FRAME_MISSION, 93, 1.0, -1.0, -1.0, 0.0, 0, 0, 0.0)
@@ -52,8 +56,14 @@ def _first_ask_us(uploaded: bool) -> int:
     else:
         standing = Waypoints([TimedPoint(0.0, ZERO), TimedPoint(60.0, ZERO)])
         plan, asked = Streamed("", "", standing, 60.0, (), 0.0, None), EventKind.MODE
+    around = Item(FRAME_LOCAL_NED, CIRCLE[True], 1e3, 0.0, 0.0, 0.0, 0, 0, 0.0)
+    plan = plan._replace(
+        fence=None if fence is None else (around,) * fence,
+        rally=None if rally is None else (around._replace(command=RALLY_POINT, param1=0.0),) * rally,
+    )
     vehicle = Vehicle(load_vehicle("yawsitter"))
-    lockstep.fly(plan, vehicle, limit_s=WARM_UP_S + 1.0)
+    turns = (fence or 0) + (rally or 0)
+    lockstep.fly(plan, vehicle, limit_s=WARM_UP_S + 1.0 + turns * TURN_US * 1e-6)
     return next(event.now_us for event in vehicle.events.since(0) if event.kind is asked)
 
 
@@ -87,7 +97,10 @@ class BatchFlight:
         start, stands = plan.reference.at(0.0).position_m, self.vehicle.snapshot().nav[:3]
         if math.dist(start, stands) > START_WITHIN_M:
             raise NotFlownError(f"the vehicle stands {math.dist(start, stands):.2f} m from where this flight starts")
-        self._go_on(_first_ask_us(False) - TURN_US)
+        asks_us = _first_ask_us(False, *_counts(plan))
+        self._go_on(asks_us - round(WARM_UP_S * 1e6) - TURN_US)
+        self._hand_over(plan)
+        self._go_on(asks_us - TURN_US)
         self._plan = plan
         self._turn()
         self._ask("mode offboard", lambda: commander.set_mode(Mode.OFFBOARD), 3.0)
@@ -126,10 +139,8 @@ class BatchFlight:
 
     def uploaded(self, plan: Uploaded) -> None:
         vehicle, commander = self.vehicle, self._commander
-        self._go_on(_first_ask_us(True) + (len(plan.items) - 2) * TURN_US)
-        refused = vehicle.mission.replace([_stored(item, first=k == 0) for k, item in enumerate(plan.items)])
-        if refused is not None:
-            raise NotFlownError(f"the vehicle refuses the mission: item {refused.index}: {refused.reason}")
+        self._go_on(_first_ask_us(True, *_counts(plan)) + (len(plan.items) - 2) * TURN_US)
+        self._hand_over(plan)
         self._turn()
         self._ask("arming", commander.arm, ARMING_PATIENCE_S, lead_s=0.0)
         self._ask("starting the mission", commander.start_mission, 2.0)
@@ -139,6 +150,17 @@ class BatchFlight:
         self._turn()
         if commander.armed:
             self._land()
+
+    def _hand_over(self, plan: Plan) -> None:
+        """The vehicle, which has none yet, takes the plans of the file."""
+        plans, mission = self.vehicle.plans, plan.items if isinstance(plan, Uploaded) else ()
+        of_kinds = (1, plans.fence, plan.fence), (2, plans.rally, plan.rally), (0, plans.mission, mission)
+        for kind, stored, items in of_kinds:
+            if items:
+                refused = stored.replace([_stored(item, kind, first=k == 0) for k, item in enumerate(items)])
+                if refused is not None:
+                    reason = f"item {refused.index}: {refused.reason}"
+                    raise NotFlownError(f"the vehicle refuses the {stored.name}: {reason}")
 
     def _follow(self, plan: Uploaded) -> None:
         """Until the vehicle has disarmed, or the mission has long been complete."""
@@ -274,7 +296,13 @@ def _target(plan: Streamed, now_us: int, start_s: float) -> OffboardTarget:
     return OffboardTarget(now_us, position, velocity, acceleration, heading)
 
 
-def _stored(item: Item, first: bool) -> MissionItem:
-    """The item as the vehicle stores it when it comes over the link."""
+def _counts(plan: Plan) -> tuple[int | None, int | None]:
+    """How many items of a fence and how many rally points there are to hand over; None: it says nothing of them."""
+    return None if plan.fence is None else len(plan.fence), None if plan.rally is None else len(plan.rally)
+
+
+def _stored(item: Item, kind: int, first: bool) -> MissionItem:
+    """The item of a plan of that MAV_MISSION_TYPE as the vehicle stores it when it comes over the link."""
     p1, p2, p3, p4, z = map(float32, (item.param1, item.param2, item.param3, item.param4, item.z))
-    return MissionItem(item.frame, item.command, int(first), item.autocontinue, p1, p2, p3, p4, item.x, item.y, z)
+    current, more = int(first and kind == 0), item.autocontinue
+    return MissionItem(item.frame, item.command, current, more, p1, p2, p3, p4, item.x, item.y, z, kind)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gcs_tools import lockstep
+from gcs_tools import lockstep, yaml_plan
 from gcs_tools import plan as plans
 from gcs_tools.metrics import Track, evaluate
 from gcs_tools.plan import Plan, Streamed, Uploaded
@@ -40,8 +40,6 @@ def over_the_link(plan: Plan, vehicle: str, **settings: Any) -> tuple[lockstep.F
 
 
 def mission(text: str) -> Uploaded:
-    from gcs_tools import yaml_plan
-
     plan = yaml_plan.loads(f"name: test\nkind: mission\nlimit_s: 60\nitems:\n{text}", "test.yaml")
     assert isinstance(plan, Uploaded)
     return plan
@@ -49,6 +47,8 @@ def mission(text: str) -> Uploaded:
 
 UP_AND_STAY = mission("  - {do: takeoff, at_m: [0, 0, -2]}\n  - {do: waypoint, at_m: [1, 0, -2]}\n")
 HOP = Streamed("hop", "", Waypoints([TimedPoint(0.0, ZERO), TimedPoint(3.0, (1.0, 0.0, -1.5))]), 4.007, (), None, None)
+FENCE = yaml_plan.loads((MISSIONS / "rectangle-fenced.yaml").read_text(), "test.yaml").fence
+FENCED_HOP = HOP._replace(fence=FENCE, rally=())
 RETURNS = mission("  - {do: takeoff, at_m: [0, 0, -2]}\n  - {do: delay, seconds_s: 1}\n  - {do: return}\n")
 
 
@@ -59,7 +59,9 @@ RETURNS = mission("  - {do: takeoff, at_m: [0, 0, -2]}\n  - {do: delay, seconds_
         pytest.param("circle.yaml", "yawsitter", {}, id="targets that end in the air"),
         pytest.param(HOP, "yawsitter-real", {"seed": 2}, id="targets without heading, for no whole number of turns"),
         pytest.param(HOP, "yawsitter", {"overrides": {"GF_MAX_HOR_DIST": 9.0}}, id="targets within a fence"),
+        pytest.param(FENCED_HOP, "yawsitter-real", {"seed": 2}, id="targets with a fence of their own"),
         pytest.param("rectangle-mission.yaml", "yawsitter-real", BREEZE, id="a mission that lands"),
+        pytest.param("rectangle-fenced.yaml", "yawsitter", {}, id="a mission with fence and rally point"),
         pytest.param(UP_AND_STAY, "yawsitter", {}, id="a mission that stays up"),
         pytest.param(RETURNS, "yawsitter-real", {"overrides": {"EST_ENABLE": 0.0}}, id="a mission that returns"),
     ],
@@ -106,6 +108,14 @@ def test_a_flight_that_goes_wrong_goes_wrong_as_over_the_link(settings: dict[str
     flown, seen = over_the_link(plan, "yawsitter", **settings)
     assert mine.fault == str(flown.flight.client.fault) != "None"
     assert mine.end_s * 1e6 == pytest.approx(max(seen), abs=200_000)
+
+
+def test_a_mission_outside_its_fence_is_stopped_as_over_the_link() -> None:
+    outside = UP_AND_STAY._replace(fence=FENCE, items=(UP_AND_STAY.items[0], UP_AND_STAY.items[1]._replace(x=300_000)))
+    mine = batch.fly(outside, load_vehicle("yawsitter"))
+    flown, _ = over_the_link(outside, "yawsitter")
+    assert mine.fault == str(flown.flight.client.fault)
+    assert "item 1 lies outside the fence: outside the polygon of fence item 0" in mine.fault
 
 
 def test_figures_are_of_the_plant_and_its_seed() -> None:

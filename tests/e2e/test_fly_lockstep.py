@@ -82,6 +82,11 @@ def test_a_mission_that_ends_in_a_landing_disarms_by_itself() -> None:
     assert flight.measured_s - flight.reached[-1][0] == pytest.approx(2.0, abs=0.1)  # COM_DISARM_LAND
 
 
+def test_a_return_leads_to_the_rally_point_that_came_with_the_mission() -> None:
+    truth = flown("rectangle-fenced.yaml").vehicle.snapshot().truth
+    assert (truth.north_m, truth.east_m) == pytest.approx((16.0, 6.0), abs=0.1)
+
+
 def test_the_qgroundcontrol_plan_is_the_yaml_mission_around_the_default_home() -> None:
     yaml, plan = plans.load(MISSIONS / "rectangle-mission.yaml"), plans.load(MISSIONS / "rectangle-mission.plan")
     assert isinstance(yaml, Uploaded)

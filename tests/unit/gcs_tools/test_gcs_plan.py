@@ -219,7 +219,6 @@ def test_an_item_in_the_mission_frame_carries_its_parameters_unscaled() -> None:
         (qgc(mission={"version": 2, "items": []}), "mission.items: has no items"),
         (qgc(mission={"version": 1, "items": []}), "mission.version: 1 can't be read; allowed: 2"),
         (qgc(mission={"version": 2}), "mission: Object missing required field `items`"),
-        (qgc(geoFence={"circles": [{}], "polygons": []}), "geoFence.circles: fences and rally points can't be flown"),
         (
             with_item(type="ComplexItem", complexItemType="survey"),
             "mission.items[1].type: 'ComplexItem' (survey) can't be flown; allowed: 'SimpleItem'",

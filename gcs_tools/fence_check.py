@@ -1,0 +1,72 @@
+"""Whether a flight keeps within its own file's fence: what the vehicle would refuse, and where it would breach it."""
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+from gcs_tools import fence
+from gcs_tools.convert import local_m
+from gcs_tools.plan import Home, Item, Streamed, Uploaded
+from gcs_tools.reference import Vector
+
+SAMPLE_S = 0.02  # the client's targets
+_TURNS, _TURN_SAMPLES = 18, 16  # NAV_LOITER_TURNS, and the points of it that the vehicle looks at
+
+
+def areas_of(plan: Streamed | Uploaded, home: Home | None) -> list[fence.Area]:
+    return fence.areas(plan.fence or (), lambda item: local_m(item, home))
+
+
+def along_reference(plan: Streamed) -> str:
+    """The first target that the vehicle would refuse and why, or nothing."""
+    areas = areas_of(plan, None)
+    if not areas:
+        return ""
+    times = [k * SAMPLE_S for k in range(math.ceil(plan.duration_s / SAMPLE_S))] + [plan.duration_s]
+    places = [plan.reference.at(t).position_m[:2] for t in times]
+    found = fence.first_outside(areas, places)
+    if found is None:
+        return ""
+    k, area = found
+    return f"the flight is {area.reason} at t = {times[k]:.2f} s, {_named(places[k])}"
+
+
+def along_items(plan: Uploaded, home: Home | None, way: Sequence[tuple[str, Vector]]) -> list[str]:
+    """What speaks against a mission: home, items, and the straight ways between places.
+
+    home: what places are measured from. way: the places in order and their names, from the start on.
+    """
+    areas = areas_of(plan, home)
+    found = fence.first_outside(areas, [(0.0, 0.0)])
+    told = [f"home is {found[1].reason}: the vehicle refuses such a fence"] if found else []
+    for index, item in enumerate(plan.items):
+        outside = fence.first_outside(areas, _looked_at(item, home))
+        if outside is not None:
+            told.append(f"item {index} lies outside the fence: {outside[1].reason}: the vehicle doesn't start it")
+    for (a, begin), (b, end) in pairwise(way):
+        left = fence.leaves(areas, begin[:2], end[:2])
+        if left is not None and fence.first_outside(areas, [begin[:2], end[:2]]) is None:
+            share, area = left
+            at = tuple(u + share * (v - u) for u, v in zip(begin[:2], end[:2], strict=True))
+            told.append(f"the way from {a} to {b} is {area.reason} from {_named(at)} on: a breach in flight")
+    for index, item in enumerate(plan.rally or ()):
+        outside = fence.first_outside(areas, [p[:2] for p in [local_m(item, home)] if p is not None])
+        if outside is not None:
+            told.append(f"rally point {index} is {outside[1].reason}: Return doesn't lead there")
+    return told
+
+
+def _looked_at(item: Item, home: Home | None) -> list[fence.Level]:
+    """The points of an item that the vehicle judges."""
+    place = local_m(item, home) if item.flies_to else None
+    if place is None:
+        return []
+    if item.command != _TURNS or not item.param3:
+        return [place[:2]]
+    around = (2.0 * math.pi * k / _TURN_SAMPLES for k in range(_TURN_SAMPLES))
+    radius = abs(item.param3)
+    return [(place[0] + radius * math.cos(a), place[1] + radius * math.sin(a)) for a in around]
+
+
+def _named(place: Sequence[float]) -> str:
+    return f"north {place[0]:.2f} m, east {place[1]:.2f} m"
