@@ -65,11 +65,12 @@ class Client:
         self._script: Script[Any] | None = None
         self.heartbeats = True  # said every second
         self._next_heartbeat_s = -math.inf
-        self._wake_s = -math.inf
+        self._wake_s = math.inf
         self._acks: dict[int, Any] = {}
         self.interval_acks: list[int] = []  # results of SET_MESSAGE_INTERVAL, which are sent many at a time
         self._state_handlers = {name: handler.__get__(self.vehicle) for name, handler in HANDLERS.items()}
         self.on: dict[str, Callable[[Any], None]] = {}  # message name → who else wants it
+        self.on_frame: Callable[[codec.Frame], None] | None = None  # who wants every frame of the vehicle
         self._heartbeat = codec.message(
             "HEARTBEAT",
             type=mav.MAV_TYPE_GCS,
@@ -102,6 +103,8 @@ class Client:
             if frame.component != _AUTOPILOT:
                 continue
             ours = True
+            if self.on_frame is not None:
+                self.on_frame(frame)
             name = frame.name
             handler = self._state_handlers.get(name)
             if handler is not None:

@@ -4,21 +4,23 @@ udpin:HOST:PORT     listen there; answer whoever the vehicle turns out to be
 udpout:HOST:PORT    send there first
 """
 
+import errno
 import select
 import socket
 import time
 from collections.abc import Callable, Iterable
 from types import TracebackType
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
-from gcs_tools.client import Client, LinkError
-from gcs_tools.fleet import Fleet
+from gcs_tools.client import LinkError
+from gcs_tools.fleet import system_of
 from gcs_tools.impairment import GOOD, Impairment, Wire
 from sitl.mavlink.signing import Signer
 
 Address = tuple[str, int]
 
 LONGEST_WAIT_S = 0.1
+_CALL_INSTEAD = "; to call the vehicle instead: --connect udpout:127.0.0.1:18570 (plus its instance)"
 _RECEIVE_BYTES = 65_535
 _BUFFER_BYTES = 1 << 20  # a burst of streams while a figure is being drawn
 
@@ -34,12 +36,28 @@ def sleep_until(wall_s: float) -> None:
         time.sleep(left_s)
 
 
+class Talker(Protocol):
+    """Who is behind a link: a Client, or many of them."""
+
+    def receive(self, data: bytes, wall_s: float) -> bool: ...
+    def poll(self, wall_s: float) -> list[bytes]: ...
+    @property
+    def next_deadline(self) -> float: ...
+    @property
+    def finished(self) -> bool: ...
+    @property
+    def fault(self) -> LinkError | None: ...
+
+
 class Connection(NamedTuple):
     """Where to listen, or whom to call."""
 
     listens: bool
     host: str
     port: int
+
+    def __str__(self) -> str:
+        return f"udp{'in' if self.listens else 'out'}:{self.host}:{self.port}"
 
 
 def parse_connection(text: str) -> Connection:
@@ -57,7 +75,10 @@ def signer(key: bytes) -> Signer:
 
 
 class UdpLink:
-    """One socket between a Client and its vehicle (or a Fleet and its), and what is to go wrong on the way."""
+    """One socket between a Client and its vehicle (or a Fleet and its), and what is to go wrong on the way.
+
+    Vehicles that are heard from several addresses are all answered: each takes what is for it.
+    """
 
     def __init__(
         self, connection: Connection, impairment: Impairment = GOOD, tap: Callable[[bytes, float], None] | None = None
@@ -65,7 +86,7 @@ class UdpLink:
         """tap: sees what the client hears and says, with the time of day [s since 1970]."""
         self._tap = tap
         where = f"{connection.host}:{connection.port}"
-        self.peer: Address | None = None  # once called, or heard
+        self._peers: dict[int | None, Address] = {}  # by system; None: who is called, until somebody is heard
         self._in: Wire[tuple[bytes, Address]]
         self._out: Wire[bytes]
         self._in, self._out = Wire(impairment), Wire(impairment.reversed())
@@ -76,11 +97,12 @@ class UdpLink:
             if connection.listens:
                 self._socket.bind((connection.host, connection.port))
             else:
-                self.peer = (socket.gethostbyname(connection.host), connection.port)
+                self._peers[None] = (socket.gethostbyname(connection.host), connection.port)
         except OSError as error:
             self._socket.close()
             verb = "listen on" if connection.listens else "reach"
-            raise LinkError(f"can't {verb} {where}: {error.strerror or error}") from None
+            instead = _CALL_INSTEAD if error.errno == errno.EADDRINUSE else ""
+            raise LinkError(f"can't {verb} {where}: {error.strerror or error}{instead}") from None
 
     def __enter__(self) -> "UdpLink":
         return self
@@ -88,7 +110,12 @@ class UdpLink:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         self._socket.close()
 
-    def turn(self, client: Client | Fleet) -> None:
+    @property
+    def peer(self) -> Address | None:
+        """Who is called, or was heard first."""
+        return next(iter(self._peers.values()), None)
+
+    def turn(self, client: Talker) -> None:
         """Send what the client has, wait for an arrival or its next deadline, hand over what has arrived."""
         self.flush(client)
         next_s = min(client.next_deadline, self._in.next_s, self._out.next_s)
@@ -106,25 +133,26 @@ class UdpLink:
             if self._tap is not None:
                 self._tap(data, time.time())
             if client.receive(data, now_s()):
-                self.peer = address
+                self._peers.pop(None, None)
+                self._peers[system_of(data)] = address
 
-    def flush(self, client: Client | Fleet) -> None:
+    def flush(self, client: Talker) -> None:
         """Send what the client has to say now. What nobody has been heard for is dropped."""
         for data in client.poll(now_s()):
             if self._tap is not None:
                 self._tap(data, time.time())
             self._out.put(now_s(), data)
         for data in self._out.take(now_s()):
-            if self.peer is not None:
+            for peer in set(self._peers.values()):
                 try:
-                    self._socket.sendto(data, self.peer)
+                    self._socket.sendto(data, peer)
                 except (BlockingIOError, ConnectionError):
                     continue
                 except OSError as error:
-                    where = f"{self.peer[0]}:{self.peer[1]}"
+                    where = f"{peer[0]}:{peer[1]}"
                     raise LinkError(f"can't send to {where}: {error.strerror or error}") from None
 
-    def run(self, client: Client | Fleet, each_turn: Callable[[float], None] = lambda _wall_s: None) -> None:
+    def run(self, client: Talker, each_turn: Callable[[float], None] = lambda _wall_s: None) -> None:
         """Until the client's script has ended, and what it sent last is on its way. Raises its fault."""
         while not client.finished:
             self.turn(client)

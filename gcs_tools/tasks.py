@@ -164,12 +164,9 @@ def _tune(args: argparse.Namespace) -> None:
 
 
 def _watch(args: argparse.Namespace) -> None:
-    from gcs_tools.watch import Watch, until
+    from gcs_tools.watch.run import watch
 
-    client = _client(args)
-    with UdpLink(args.connect, args.impair) as link, Watch(client) as watch:
-        client.start(until(client, args.seconds or math.inf))
-        link.run(client, watch.update)
+    watch(args.connect, args.impair, args.system, _signer(args), args.seconds or math.inf)
 
 
 def _view(args: argparse.Namespace) -> None:

@@ -22,6 +22,7 @@ MODES = {
 }
 MODE_NAMES = {number: name for name, number in MODES.items()}
 SEVERITIES = ("emergency", "alert", "critical", "error", "warning", "notice", "info", "debug")
+_UNKNOWN_U16 = 0xFFFF
 _TEXT_PIECE = 50  # a STATUSTEXT of this length goes on in the next
 _ON_CONNECT = re.compile(r"SITL.*'([^']+)'")
 
@@ -47,16 +48,22 @@ class VehicleState:
         self.armed = False
         self.mode: str | None = None
         self.ready: bool | None = None  # pre-arm checks passed; None: not told
+        self.unhealthy: list[str] = []  # sensors and the like that are in use and not well
         self.landed = 0  # MAV_LANDED_STATE
         self.position_m: Vector | None = None  # north, east, down of the vehicle's origin
         self.velocity_m_s: Vector = (0.0, 0.0, 0.0)
         self.reference_m: Vector | None = None  # where it is to be now
         self.angles_deg: Vector | None = None  # the paper's φ, θ, ψ
         self.thrust_N: float | None = None
+        self.thrusts_N: tuple[float, float] | None = None  # left, right
+        self.flaps_deg: tuple[float, float] | None = None  # left, right
         self.battery = -1  # percent
+        self.battery_V: float | None = None
+        self.battery_A: float | None = None
         self.home: tuple[float, float, float] | None = None  # degrees, degrees, metres AMSL
         self.mission_state = 0  # MISSION_STATE
         self.mission_item: int | None = None
+        self.mission_total: int | None = None  # items; None: not told, or no mission
         self.parameters: dict[str, Parameter] = {}  # whoever asked for them, or changed them
         self.texts: deque[Text] = deque(maxlen=200)
         self._pieces: dict[int, list[str]] = {}
@@ -80,7 +87,11 @@ class VehicleState:
     def sys_status(self, m: Any, wall_s: float) -> None:
         if m.onboard_control_sensors_present & mav.MAV_SYS_STATUS_PREARM_CHECK:
             self.ready = bool(m.onboard_control_sensors_health & mav.MAV_SYS_STATUS_PREARM_CHECK)
+        enabled = m.onboard_control_sensors_enabled & ~mav.MAV_SYS_STATUS_PREARM_CHECK
+        self.unhealthy = _parts(enabled & ~m.onboard_control_sensors_health)
         self.battery = m.battery_remaining
+        self.battery_V = m.voltage_battery * 1e-3 if m.voltage_battery != _UNKNOWN_U16 else None
+        self.battery_A = m.current_battery * 1e-2 if m.current_battery != -1 else None
 
     def extended_sys_state(self, m: Any, wall_s: float) -> None:
         self.landed = m.landed_state
@@ -89,13 +100,16 @@ class VehicleState:
         if m.name == "YXZ_DEG":
             self.angles_deg = (m.x, m.y, m.z)
         elif m.name == "THRUST_N":
-            self.thrust_N = m.z
+            self.thrust_N, self.thrusts_N = m.z, (m.x, m.y)
+        elif m.name == "FLAP_DEG":
+            self.flaps_deg = (m.x, m.y)
 
     def home_position(self, m: Any, wall_s: float) -> None:
         self.home = (m.latitude * 1e-7, m.longitude * 1e-7, m.altitude * 1e-3)
 
     def mission_current(self, m: Any, wall_s: float) -> None:
         self.mission_state, self.mission_item = m.mission_state, m.seq
+        self.mission_total = m.total if 0 < m.total < _UNKNOWN_U16 else None
 
     def param_value(self, m: Any, wall_s: float) -> None:
         if not is_hash(m):
@@ -130,6 +144,14 @@ class VehicleState:
                 return found[1]
         return None
 
+
+def _parts(flags: int) -> list[str]:
+    """Names of MAV_SYS_STATUS_SENSOR flags."""
+    named = ((bit, entry.name) for bit, entry in mav.enums["MAV_SYS_STATUS_SENSOR"].items() if flags & bit)
+    return [_PREFIX.sub("", name).lower().replace("_", " ") for _, name in sorted(named)]
+
+
+_PREFIX = re.compile("MAV_SYS_STATUS_(SENSOR_)?")
 
 HANDLERS = {
     "HEARTBEAT": VehicleState.heartbeat,

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from gcs_tools.report.tlog_frames import Stamped
 from sitl.mavlink.codec import Frame
 
-_RECENT = 256  # frames that one may repeat: a round of the counter
+_RECENT = 128  # frames that one may repeat: half a round, as after a whole one the same bytes may be said anew
 _AWAY = 128  # frames without the one that should follow, after which it is lost: half a round
 _RETURNS = 4  # to where a counter was left, for each time that it was lost, that make it one among others
 

@@ -141,6 +141,8 @@ class StandIn:
         self.targets.append((self.now_s, m))
 
     def _on_command_long(self, m: Any, back: dict[str, int]) -> None:
+        if m.target_system not in (0, self.system):
+            return
         self.commands.append(m)
         left = self.unanswered.get(m.command, 0)
         if left:
@@ -174,6 +176,9 @@ class StandIn:
         elif m.command == mav.MAV_CMD_REQUEST_MESSAGE and int(m.param1) == codec.by_name("MESSAGE_INTERVAL").id:
             interval = self.intervals.get(codec.by_id(int(m.param2)).name, -1)
             self.send("MESSAGE_INTERVAL", message_id=int(m.param2), interval_us=interval)
+
+    def _on_timesync(self, m: Any, _back: dict[str, int]) -> None:
+        self.send("TIMESYNC", tc1=round(self.now_s * 1e9), ts1=m.ts1)
 
     def _on_mission_count(self, m: Any, back: dict[str, int]) -> None:
         self.expected, self._incoming, self._back = m.count, [], back

@@ -3,11 +3,12 @@
 import pytest
 from gcs_tools_stand_in import Pair, StandIn
 
-from gcs_tools import commands, watch
+from gcs_tools import commands
 from gcs_tools import plan as plans
 from gcs_tools.client import Client, LinkError, Script
 from gcs_tools.link import Connection, parse_connection
 from gcs_tools.vehicle_state import VehicleState
+from gcs_tools.watch import plain
 from sitl.mavlink import codec
 from sitl.mavlink.codec import mav
 
@@ -187,8 +188,8 @@ def test_the_watch_line_shows_mode_place_and_angles() -> None:
     client, vehicle = Client(), StandIn()
     vehicle.position = (1.0, 2.0, -3.0)
     vehicle.intervals = {"LOCAL_POSITION_NED": 20_000, "DEBUG_VECT": 100_000, "SYS_STATUS": 100_000}
-    client.start(watch.until(client, 1.0))
+    client.start(plain.until(client, 1.0))
     Pair(client, vehicle).run()
-    line = watch.line(client)
+    line = plain.line(client)
     for part in ("mode: hold, disarmed", "north 1.000 east 2.000 down -3.000 m", "95.00°", "11.00 N", "ready: yes"):
         assert part in line

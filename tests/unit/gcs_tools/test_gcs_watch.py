@@ -4,7 +4,7 @@ import math
 
 from gcs_tools.client import Client
 from gcs_tools.vehicle_state import HANDLERS
-from gcs_tools.watch import line, rows
+from gcs_tools.watch.plain import line, rows
 from sitl.mavlink.codec import mav
 
 

@@ -1,15 +1,12 @@
-"""`gcs watch`: what the vehicle tells of itself, live: a panel on a terminal, a line a second elsewhere."""
+"""What the vehicle tells of itself, a line a second: for files, pipes and terminals that can't be drawn on."""
 
 import math
-import sys
-from typing import Any
 
 from gcs_tools.client import Client, Script
-from gcs_tools.vehicle_state import SEVERITIES, VehicleState
+from gcs_tools.link import UdpLink
+from gcs_tools.vehicle_state import VehicleState
 
-REDRAW_S = 0.2
 LINE_S = 1.0
-TEXTS = 6  # of the newest shown
 _LANDED = ("", "on the ground", "in the air", "taking off", "landing")
 
 
@@ -65,43 +62,15 @@ def line(client: Client) -> str:
     return "  ".join(f"{label}: {' '.join(value.split())}" for label, value in rows(client))
 
 
-class Watch:
-    """Draws; give it the chance to by calling `update` often."""
+def follow(link: UdpLink, client: Client, seconds: float) -> None:
+    """Print a line a second for so long. Raises LinkError where there is no vehicle, or it is lost."""
+    printed_s = -math.inf
 
-    def __init__(self, client: Client) -> None:
-        self._client = client
-        self._drawn_s = -math.inf
-        self._texts = 0
-        self._live: Any = None
+    def update(wall_s: float) -> None:
+        nonlocal printed_s
+        if client.vehicle.mode is not None and wall_s - printed_s >= LINE_S:
+            printed_s = wall_s
+            print(line(client), flush=True)
 
-    def __enter__(self) -> "Watch":
-        if sys.stdout.isatty():
-            from rich.live import Live
-
-            self._live = Live(auto_refresh=False)
-            self._live.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._live is not None:
-            self._live.stop()
-
-    def update(self, wall_s: float) -> None:
-        if self._client.vehicle.mode is None or wall_s - self._drawn_s < (REDRAW_S if self._live else LINE_S):
-            return
-        self._drawn_s = wall_s
-        if self._live is not None:
-            self._live.update(self._panel(), refresh=True)
-            return
-        print(line(self._client), flush=True)
-
-    def _panel(self) -> Any:
-        from rich.markup import escape
-        from rich.table import Table
-
-        table = Table.grid(padding=(0, 2))
-        for label, value in rows(self._client):
-            table.add_row(f"[dim]{label}[/]", escape(value))
-        for text in list(self._client.vehicle.texts)[-TEXTS:]:
-            table.add_row(f"[dim]{SEVERITIES[text.severity & 7]}[/]", escape(text.text))
-        return table
+    client.start(until(client, seconds))
+    link.run(client, update)
