@@ -48,9 +48,12 @@ def edited(tmp_path: Path, old: str, new: str) -> str:
     return str(path)
 
 
-def test_a_file_of_ones_own_is_a_vehicle_too(tmp_path: Path) -> None:
-    spec = load_vehicle(edited(tmp_path, "control_rate_hz: 500", "control_rate_hz: 250"))
-    assert (spec.name, spec.step_us, spec.substeps) == ("mine", 4000, 2)
+@pytest.mark.parametrize(("rate_hz", "step_us", "substeps"), [(250, 4000, 1), (200, 5000, 2), (100, 10_000, 3)])
+def test_a_file_of_ones_own_is_a_vehicle_too_integrated_in_steps_of_4_ms_at_most(
+    tmp_path: Path, rate_hz: int, step_us: int, substeps: int
+) -> None:
+    spec = load_vehicle(edited(tmp_path, "control_rate_hz: 500", f"control_rate_hz: {rate_hz}"))
+    assert (spec.name, spec.step_us, spec.substeps) == ("mine", step_us, substeps)
 
 
 @pytest.mark.parametrize(
