@@ -7,10 +7,12 @@ from typing import Any
 
 from gcs_tools.client import Client
 from gcs_tools.reference import Vector
+from gcs_tools.vehicle_state import Text
 from gcs_tools.watch.traces import Trace
 from sitl.mavlink import codec
 
 STALE_S = 1.5  # without a stamp, after which the vehicle's clock stands still
+SEEN = 8  # beyond all severities: not told by the vehicle, but seen
 _RATE_WINDOW_S = 3.0
 _PAIR_S = 0.5  # of the vehicle's time between a position and the reference that it is compared with
 _TRACK_S = 0.5
@@ -35,7 +37,9 @@ class Instruments:
         self.heartbeat_s: float | None = None
         self.joined_in_flight = False
         self.error, self.height, self.thrust, self.speed = Trace(max), Trace(), Trace(), Trace()
-        self.flap = Trace()
+        self.motor, self.flap = Trace(), Trace()  # the greater amount of left and right
+        self.changes: deque[Text] = deque(maxlen=100)  # what was seen to happen
+        self._was: tuple[str | None, bool] | None = None  # mode, armed
         self.track: deque[tuple[float, float]] = deque(maxlen=_TRACK_KEPT)  # north, east [m]
         self._track_s = -math.inf
         self._target: Any = None
@@ -53,6 +57,7 @@ class Instruments:
             "WIND_COV": self._wind,
             "ESTIMATOR_STATUS": self._estimator,
             "SYSTEM_TIME": self._time,
+            "MISSION_ITEM_REACHED": self._item_reached,
             "TIMESYNC": self._timesync,
         }
 
@@ -100,6 +105,21 @@ class Instruments:
             self._flown_s, self._armed_s, self.joined_in_flight = self.flight_s, None, False
         if first:
             self.joined_in_flight = v.armed
+        self._changed(v.mode, v.armed)
+
+    def _changed(self, mode: str | None, armed: bool) -> None:
+        if self._was is not None:
+            if self._was[0] != mode:
+                self._note(f"mode {mode}")
+            if self._was[1] != armed:
+                self._note("armed" if armed else "disarmed")
+        self._was = mode, armed
+
+    def _item_reached(self, m: Any) -> None:
+        self._note(f"item {m.seq + 1} reached")
+
+    def _note(self, text: str) -> None:
+        self.changes.append(Text(self._client.wall_s, SEEN, text))
 
     def _clock(self, stamp_s: float) -> None:
         wall_s = self._client.wall_s
@@ -137,6 +157,7 @@ class Instruments:
     def _debug(self, m: Any) -> None:
         if m.name == "THRUST_N":
             self.thrust.put(m.z, self._client.wall_s)
+            self.motor.put(max(m.x, m.y), self._client.wall_s)
         elif m.name == "FLAP_DEG":
             self.flap.put(max(abs(m.x), abs(m.y)), self._client.wall_s)
 

@@ -4,13 +4,16 @@ from typing import NamedTuple
 
 from rich.text import Text
 
-from gcs_tools.watch import blocks, track_map
-from gcs_tools.watch.blocks import BAD, DIM, GOOD, PLACE_WIDTH, WARN, beside, rule
+from gcs_tools.watch import blocks, motion, track_map
 from gcs_tools.watch.gauges import compass, duration, printable
+from gcs_tools.watch.lines import BAD, DIM, GOOD, WARN, beside, join, rule
+from gcs_tools.watch.motion import PLACE_WIDTH
 from gcs_tools.watch.seen import Seen
 
 WIDE = 116  # columns from which a map and the link stand beside
 GAP = 2
+CURVE_MAX = 8  # lines of a curve
+NEWS_ROWS = 6
 TABLE_ROWS = 6  # of vehicles on a screen of 24 lines
 _KEYS = "q quit   space pause   ←→ 1–9 vehicle"
 
@@ -76,22 +79,21 @@ def _body(seen: Seen, wall_s: float, width: int, room: int) -> list[Text]:
         return _main(seen, wall_s, width, room)
     side = min(80, max(38, width * 9 // 25))
     main = _main(seen, wall_s, width - side - GAP, room, link_beside=True)
-    return _join(main, _side(seen, wall_s, side, room), width - side)
+    return join(main, _side(seen, wall_s, side, room), width - side, GAP)
 
 
 def _main(seen: Seen, wall_s: float, width: int, room: int, link_beside: bool = False) -> list[Text]:
     """Numbers and gauges, curves as high as there is room, mission, link, texts."""
-    made = _join(blocks.motion(seen), blocks.actuators(seen, width - PLACE_WIDTH - GAP), PLACE_WIDTH + GAP)
-    status = [beside(blocks.mission(seen, width - 24), blocks.estimator(seen), width)]
+    made = join(motion.place(seen), motion.actuators(seen, width - PLACE_WIDTH - GAP), PLACE_WIDTH + GAP, GAP)
+    status = [rule("status", width), blocks.status(seen, width)]
     if not link_beside:
         status += blocks.link(seen, wall_s, width, 0 if room < 34 else 4)
-    left = room - len(made) - 1 - len(status) - 1
-    tall = max(1, min(6, (left - 4) // 5))
-    made += blocks.curves(seen, wall_s, width, tall)
-    made += [rule("status", width), *status]
+    tall = max(1, min(CURVE_MAX, (room - len(made) - 1 - len(status) - NEWS_ROWS) // 4))
+    made += motion.curves(seen, wall_s, width, tall)
+    made += status
     rows = room - len(made) - 1
     if rows > 0:
-        made += [rule("told", width), *blocks.told(seen, wall_s, width, rows)]
+        made += [rule("news", width), *blocks.news(seen, wall_s, width, rows)]
     return made
 
 
@@ -169,13 +171,3 @@ def _line(place: int, seen: Seen, scene: Scene) -> Text:
 
 def _told(x: float | None, digits: int) -> str:
     return "–" if x is None else f"{x:.{digits}f}"
-
-
-def _join(left: list[Text], right: list[Text], column: int) -> list[Text]:
-    """Both side by side, the right one from this column on."""
-    made = []
-    for k in range(max(len(left), len(right))):
-        line = left[k].copy() if k < len(left) else Text()
-        line.truncate(column - GAP, pad=True)
-        made.append(line.append(" " * GAP).append_text(right[k] if k < len(right) else Text()))
-    return made

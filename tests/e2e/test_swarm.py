@@ -16,6 +16,7 @@ import pytest
 import zenoh
 from daemon_process import BOOT_LIMIT_S, ROOT, command, mavlink
 from pymavlink import mavutil
+from terminal import Terminal
 
 pytestmark = pytest.mark.e2e
 
@@ -104,6 +105,17 @@ def test_a_ground_station_at_the_shared_port_sees_all_of_them_apart(swarm) -> No
     assert (b.lon - a.lon) * METRES_PER_1E7 * shrunk == pytest.approx(4.0, abs=0.05)
     assert (c.lat - a.lat) * METRES_PER_1E7 == pytest.approx(4.0, abs=0.05)
     assert a.lat == pytest.approx(b.lat, abs=2)
+
+
+def test_the_dashboard_has_a_row_for_each_and_shows_the_one_that_is_chosen(swarm) -> None:
+    second, third = swarm.systems[1:]
+    with Terminal("watch", "--system", str(second), "--connect", f"udpout:127.0.0.1:{swarm.port}") as terminal:
+        screen = terminal.until(lambda screen: "3 vehicles" in screen and f"· system {second} " in screen)
+        assert f"▶ {second}" in screen
+        terminal.press("3")
+        terminal.until(lambda screen: f"· system {third} " in screen and f"▶ {third}" in screen)
+        terminal.process.send_signal(signal.SIGTERM)
+        assert terminal.end() == 128 + signal.SIGTERM
 
 
 def test_a_command_acts_on_the_vehicle_that_it_names_and_its_own_port_reaches_it_too(swarm) -> None:
