@@ -50,6 +50,11 @@ def nice(x: float) -> float:
     )
 
 
+def fixed(x: float, digits: int, signed: bool = False) -> str:
+    """A number with so many digits behind the point; what rounds to nothing has no sign."""
+    return f"{round(x, digits) + 0.0:{'+' if signed else ''}.{digits}f}"
+
+
 def duration(seconds: float) -> str:
     """Minutes and seconds, hours where there are any."""
     minutes, s = divmod(int(max(0.0, seconds)), 60)

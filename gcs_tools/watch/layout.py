@@ -5,13 +5,14 @@ from typing import NamedTuple
 from rich.text import Text
 
 from gcs_tools.watch import blocks, motion, track_map
-from gcs_tools.watch.gauges import compass, duration, printable
+from gcs_tools.watch.gauges import compass, duration, fixed, printable
 from gcs_tools.watch.lines import BAD, DIM, GOOD, WARN, beside, join, rule
 from gcs_tools.watch.motion import PLACE_WIDTH
 from gcs_tools.watch.seen import Seen
 
 WIDE = 116  # columns from which a map and the link stand beside
 GAP = 2
+ROOMY = 18  # lines below the head, fewer of which leave no place for a rule
 CURVE_MAX = 8  # lines of a curve
 NEWS_ROWS = 6
 TABLE_ROWS = 6  # of vehicles on a screen of 24 lines
@@ -85,9 +86,11 @@ def _body(seen: Seen, wall_s: float, width: int, room: int) -> list[Text]:
 def _main(seen: Seen, wall_s: float, width: int, room: int, link_beside: bool = False) -> list[Text]:
     """Numbers and gauges, curves as high as there is room, mission, link, texts."""
     made = join(motion.place(seen), motion.actuators(seen, width - PLACE_WIDTH - GAP), PLACE_WIDTH + GAP, GAP)
-    status = [rule("status", width), blocks.status(seen, width)]
+    status = [blocks.status(seen, width)]
     if not link_beside:
         status += blocks.link(seen, wall_s, width, 0 if room < 34 else 4)
+    if room >= ROOMY:
+        status.insert(0, rule("status", width))
     tall = max(1, min(CURVE_MAX, (room - len(made) - 1 - len(status) - NEWS_ROWS) // 4))
     made += motion.curves(seen, wall_s, width, tall)
     made += status
@@ -170,4 +173,4 @@ def _line(place: int, seen: Seen, scene: Scene) -> Text:
 
 
 def _told(x: float | None, digits: int) -> str:
-    return "–" if x is None else f"{x:.{digits}f}"
+    return "–" if x is None else fixed(x, digits)

@@ -8,6 +8,7 @@ from rich.text import Text
 
 from gcs_tools.reference import Vector
 from gcs_tools.watch import gauges
+from gcs_tools.watch.gauges import fixed
 from gcs_tools.watch.lines import DIM, GOOD, NUMBER, TITLE, WARN, label, rule
 from gcs_tools.watch.seen import Seen
 from gcs_tools.watch.traces import KEPT_S, Trace
@@ -50,7 +51,7 @@ def _row(name: str, vector: Vector | None, digits: int, end: str, style: str = N
     text = label(name, LABEL)
     if vector is None:
         return text.append(f"{'–':>8} {'–':>8} {'–':>8}", DIM)
-    return text.append(" ".join(f"{x + 0.0:8.{digits}f}" for x in vector), style).append(f" {end}", DIM)
+    return text.append(" ".join(f"{fixed(x, digits):>8}" for x in vector), style).append(f" {end}", DIM)
 
 
 def _norm(vector: Vector | None, digits: int, unit: str) -> str:
@@ -83,8 +84,7 @@ def _gauge(name: str, value: float | None, unit: str, picture: _Picture, most: f
     if value is None:
         return text.append(f"{'–':>8}", DIM)
     cells = max(1, width - 7 - 9 - 2)
-    signed = "+" if picture is gauges.balance else ""
-    text.append(f"{value + 0.0:{signed}7.2f}{unit:<2}", NUMBER)
+    text.append(f"{fixed(value, 2, signed=picture is gauges.balance):>7}{unit:<2}", NUMBER)
     return text.append("▕", DIM).append(picture(value / most, cells), style).append("▏", DIM)
 
 
@@ -124,8 +124,8 @@ def _drawn(curve: _Curve, trace: Trace, count: int, wall_s: float, height: int) 
     lines = []
     for k, cells in enumerate(gauges.sparkline(values, height, low, high)):
         line = label(curve.name if k == 0 else "", _BEGIN).append(cells, curve.style)
-        value = f"{trace.value + 0.0:.{digits}f} {curve.unit}" if k == 0 and now and trace.value is not None else ""
-        limit = f"≤ {high:.{digits}f}" if k == 0 else f"≥ {low + 0.0:.{digits}f}" if k == height - 1 else ""
+        value = f"{fixed(trace.value, digits)} {curve.unit}" if k == 0 and now and trace.value is not None else ""
+        limit = f"≤ {fixed(high, digits)}" if k == 0 else f"≥ {fixed(low, digits)}" if k == height - 1 else ""
         lines.append(line.append(f" {value:>9}", NUMBER).append(f" {limit if known else '':<8}", DIM))
     return lines
 
@@ -137,4 +137,6 @@ def _scale(curve: _Curve, known: list[float]) -> tuple[float, float]:
         return 0.0, gauges.nice(max(curve.least, most))
     least = min(known, default=0.0)
     spare = max(0.0, 0.5 * (curve.least - (most - least)))
+    if least - spare < 0.0 <= most and spare > 0.0:  # standing, or with the motors off
+        return min(0.0, least), min(0.0, least) + curve.least
     return least - spare, most + spare

@@ -27,7 +27,7 @@ def test_a_screen_of_24_lines_shows_the_vehicle_its_motion_and_its_actuators() -
     assert "flap l -3.00° ▕" in row(screen, "flap l")
     assert row(screen, "φ θ ψ").startswith("φ θ ψ 1.00 95.00 -2.00 ° θ − 90 +5.00°")
     assert "11.00 N" in row(screen, "thrust ")
-    assert row(screen, "height ").endswith("3.00 m")
+    assert row(screen, "height ").endswith("3.00 m ≤ 3.50")
     assert "q quit" in screen
 
 
