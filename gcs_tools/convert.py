@@ -4,7 +4,6 @@ import math
 from pathlib import Path
 
 from gcs_tools import plan as plans
-from gcs_tools.fence import LEVEL
 from gcs_tools.plan import (
     FRAME_LOCAL_NED,
     FRAME_MISSION,
@@ -69,7 +68,7 @@ def _to_metres(item: Item, home: Home | None, where: str) -> Item:
         raise ConfigError(f"{where}: frame: {item.frame} has no metres from home without --home LAT,LON,ALT")
     north, east, down = (round(v, _GRID_M) + 0.0 for v in place)
     x, y = round(north * LOCAL_SCALE), round(east * LOCAL_SCALE)
-    return item._replace(frame=FRAME_LOCAL_NED, x=x, y=y, z=0.0 if item.command in LEVEL else down)
+    return item._replace(frame=FRAME_LOCAL_NED, x=x, y=y, z=down)
 
 
 def _to_degrees(item: Item, home: Home | None, where: str) -> Item:

@@ -19,7 +19,6 @@ from gcs_tools.reference import Vector
 RETURN_POINT, RALLY_POINT = 5000, 5100  # MAV_CMD
 POLYGON = {True: 5001, False: 5002}  # by inclusion
 CIRCLE = {True: 5003, False: 5004}
-LEVEL = (*POLYGON.values(), *CIRCLE.values())  # items without a height
 
 _TOLD = 8  # areas, one by one
 

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 from gcs_tools import fence
 from gcs_tools.convert import local_m
-from gcs_tools.plan import Home, Item, Streamed, Uploaded
+from gcs_tools.plan import LOCAL_FRAMES, Home, Item, Streamed, Uploaded
 from gcs_tools.reference import Vector
 
 SAMPLE_S = 0.02  # the client's targets
@@ -37,7 +37,8 @@ def along_items(plan: Uploaded, home: Home | None, way: Sequence[tuple[str, Vect
     home: what places are measured from. way: the places in order and their names, from the start on.
     """
     areas = areas_of(plan, home)
-    found = fence.first_outside(areas, [(0.0, 0.0)])
+    has_home = plan.home is not None or any(item.frame in LOCAL_FRAMES for item in plan.fence or ())
+    found = fence.first_outside(areas, [(0.0, 0.0)]) if has_home else None
     told = [f"home is {found[1].reason}: the vehicle refuses such a fence"] if found else []
     for index, item in enumerate(plan.items):
         outside = fence.first_outside(areas, _looked_at(item, home))

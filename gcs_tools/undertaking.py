@@ -16,6 +16,7 @@ class Undertaking(ABC):
         self.phase = "connecting"
         self.notes: list[str] = []
         self.t0_s: float | None = None  # when its time starts, on the vehicle's clock
+        self._said = ""  # by the vehicle, most recently
         client.on["STATUSTEXT"] = self._told
 
     @property
@@ -30,9 +31,11 @@ class Undertaking(ABC):
         """From 0 to 1."""
 
     def _told(self, m: Any) -> None:
+        """What it says again and again, as it does while it is asked again and again, is noted once."""
         texts = self.client.vehicle.texts
-        if m.severity <= mav.MAV_SEVERITY_WARNING and texts:
-            self._note(f"vehicle says: {texts[-1].text}")
+        if m.severity <= mav.MAV_SEVERITY_WARNING and texts and texts[-1].text != self._said:
+            self._said = texts[-1].text
+            self._note(f"vehicle says: {self._said}")
 
     def _note(self, text: str) -> None:
         t = self.t_s

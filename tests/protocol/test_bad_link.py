@@ -77,11 +77,23 @@ def take_off_and_land(client: Client) -> Script[None]:
     yield from commands.land(client, wait=True)
 
 
+FENCED = load("missions/rectangle-fenced.yaml")
+
+
+def hand_over_fenced(client: Client) -> Script[None]:
+    """After another fence, which is read before it is replaced."""
+    yield from upload.upload(
+        client, [Item(1, 5003, 50.0 + k, 0.0, 0.0, 0.0, 0, 0, 0.0) for k in range(5)], upload.FENCE
+    )
+    yield from upload.hand_over(client, FENCED)
+
+
 INTERVALS = {"ATTITUDE": 50_000, "LOCAL_POSITION_NED": 20_000, "SYS_STATUS": 500_000, "VFR_HUD": -1}
 TALKS: dict[str, tuple[Callable[[Client], Script[Any]], float]] = {
     "list all parameters": (params.fetch_all, 20.0),
     "write a parameter": (lambda client: params.store(client, "RATE_Y_P", 0.25), 20.0),
     "upload 100 mission items": (lambda client: upload.upload(client, waypoints(100)), 120.0),
+    "hand over a fenced mission": (hand_over_fenced, 60.0),
     "set up streams": (lambda client: client.set_intervals(INTERVALS), 20.0),
     "take off and land": (take_off_and_land, 90.0),
 }
@@ -99,6 +111,11 @@ def test_it_completes_over_the_worst_link_that_is_promised(spec: VehicleSpec, wh
         assert pair.vehicle.parameters["RATE_Y_P"] == 0.25
     elif what == "upload 100 mission items":
         assert [item.x for item in pair.vehicle.mission.items] == [item.x for item in waypoints(100)]
+    elif what == "hand over a fenced mission":
+        plans = pair.vehicle.plans
+        stored, sent = (plans.mission, plans.fence, plans.rally), (FENCED.items, FENCED.fence, FENCED.rally)
+        for store, items in zip(stored, sent, strict=True):
+            assert [(i.command, i.x, i.y) for i in store.items] == [(i.command, i.x, i.y) for i in items]
     elif what == "set up streams":
         (peer,) = pair.endpoint.peers
         set_to = {name: peer.schedule.interval(by_name(name).id) for name in INTERVALS}

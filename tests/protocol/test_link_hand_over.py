@@ -81,7 +81,9 @@ def test_what_a_file_says_is_on_the_vehicle_verbatim(desk: Desk, ending: str, tm
     assert told == ["5 fence items uploaded", "1 rally point uploaded", "5 mission items uploaded"]
     for kind, items in ((MISSION, plan.items), (FENCE, plan.fence), (RALLY, plan.rally)):
         assert items is not None
+        before_us = desk.vehicle.now_us
         back = desk.run(download(desk.client, kind))
+        assert desk.vehicle.now_us - before_us < 300_000  # a turn for each item, no repetitions
         assert str(back) == str(tuple(map(as_carried, items)))
 
 

@@ -99,10 +99,10 @@ def test_a_mission_is_started_in_the_air_and_the_vehicle_held_in_its_midst(page:
     page.until(lambda: page.pilot.completed == 1)
     page.world.speed = 5.0
     page.until(lambda: commander.armed and commander.mode.value == "hold")
-    mission = plans.load("missions/rectangle-mission.yaml")
+    mission = plans.load("missions/rectangle-fenced.yaml")
     page.pilot.ask(lambda client: commands.mission(client, mission))
     page.until(lambda: page.pilot.completed == 2)
-    assert page.pilot.lines[-1].text == "mission rectangle-mission under way"
+    assert page.pilot.lines[-1].text == "mission rectangle-fenced under way"
     assert commander.mode.value == "mission"
     page.run(1.0)
     page.pilot.ask(lambda client: commands.mode(client, "hold"))

@@ -126,6 +126,14 @@ def test_a_mission_drawn_for_another_town_stays_on_the_ground() -> None:
     assert not vehicle.armed
 
 
+def test_a_vehicle_that_knows_no_fences_is_not_given_a_mission_that_has_one() -> None:
+    client, vehicle = Client(), StandIn()
+    with pytest.raises(LinkError, match="the download of the fence isn't answered"):
+        run(client, commands.mission(client, plans.load("missions/rectangle-fenced.yaml")), vehicle)
+    assert not vehicle.items
+    assert not vehicle.armed
+
+
 def test_the_newest_value_of_a_parameter_is_known_whoever_changed_it() -> None:
     client, vehicle = Client(), StandIn()
     run(client, client.connect(), vehicle)

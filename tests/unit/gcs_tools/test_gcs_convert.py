@@ -158,3 +158,11 @@ def test_an_altitude_above_sea_level_becomes_a_height_above_home(tmp_path: Path)
     assert item_written.z == -6.0
     [row] = timeline.rows(plan.load(source))
     assert row.place_m == pytest.approx((0.0, 75.8, -6.0), abs=0.1)
+
+
+def test_a_place_to_look_at_is_no_place_to_fly_to(tmp_path: Path) -> None:
+    source = tmp_path / "roi.waypoints"
+    source.write_text(WAYPOINTS + "5\t0\t3\t195\t0\t0\t0\t0\t47.5\t8.5456\t0\t1\n")
+    *flown, looked_at = timeline.rows(plan.load(source))
+    assert (looked_at.place_m, looked_at.way_m) == (None, None)
+    assert looked_at.end_s == flown[-1].end_s

@@ -8,16 +8,18 @@ from typing import Any
 
 import pytest
 
-from gcs_tools import fence, plan, qgc_plan, timeline, yaml_plan
+from gcs_tools import fence, fence_check, plan, qgc_plan, timeline, yaml_plan
 from gcs_tools.__main__ import main
 from gcs_tools.plan import Item, Uploaded
 from sitl.geodesy import GeoPoint
 from sitl.onboard.events import EventLog
+from sitl.onboard.feasibility import Feasibility
 from sitl.onboard.fence import Fence, shut_out
 from sitl.onboard.places import Places
 from sitl.onboard.plan import MissionItem
 from sitl.onboard.store import MemoryStore
 from sitl.strict_yaml import ConfigError
+from sitl.vehicle import Vehicle, load_vehicle
 
 FENCED = Path(__file__).parents[3] / "missions" / "rectangle-fenced.yaml"
 HOME = "55.6985,37.3595,190"
@@ -91,8 +93,8 @@ def test_a_mistake_in_a_fence_is_named_by_line_field_and_what_is_allowed(lines: 
     assert "\n" not in str(caught.value)
 
 
-POLYGON = {"polygon": [[47.0, 8.0], [47.001, 8.0], [47.001, 8.001]], "inclusion": True, "version": 1}
-CIRCLE = {"circle": {"center": [47.0005, 8.0005], "radius": 3.5}, "inclusion": False, "version": 1}
+POLYGON: dict[str, Any] = {"polygon": [[47.0, 8.0], [47.001, 8.0], [47.001, 8.001]], "inclusion": True, "version": 1}
+CIRCLE: dict[str, Any] = {"circle": {"center": [47.0005, 8.0005], "radius": 3.5}, "inclusion": False, "version": 1}
 
 
 def qgc(**changes: Any) -> str:
@@ -346,6 +348,19 @@ def test_what_breaks_the_fence_is_named(
     assert err == f"gcs plan: a.yaml: {message}"
 
 
+def test_of_a_plan_without_a_home_it_is_not_asked_whether_home_lies_within(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    whole = json.loads(qgc(geoFence={"circles": [CIRCLE], "polygons": [], "version": 2}))
+    [item] = whole["mission"]["items"]
+    item["params"][4:6] = CIRCLE["circle"]["center"]
+    del whole["mission"]["plannedHomePosition"]
+    code, out, _ = told(json.dumps(whole), tmp_path, capsys, name="a.plan")
+    assert code == 2
+    assert "item 0 lies outside the fence" in out
+    assert "home is" not in out
+
+
 def test_a_loiter_is_judged_by_its_whole_circle(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     whole = json.loads(qgc(geoFence={"circles": [], "polygons": [], "version": 2}, rallyPoints={"points": []}))
     around = {"center": whole["mission"]["plannedHomePosition"][:2], "radius": 40}
@@ -356,6 +371,32 @@ def test_a_loiter_is_judged_by_its_whole_circle(tmp_path: Path, capsys: pytest.C
         code, out, _ = told(json.dumps(whole), tmp_path, capsys, name="a.plan")
         assert (code == 2) is (command == 18)
         assert ("item 0 lies outside the fence: outside the circle of fence item 0" in out) is (command == 18)
+
+
+def test_a_mission_is_judged_as_the_vehicle_judges_it() -> None:
+    rng, vehicle, verdicts = random.Random(8), Vehicle(load_vehicle("yawsitter")), []
+    plans, told = vehicle.plans, Feasibility(vehicle.plans)
+    for _ in range(80):
+        areas = drawn(rng)
+        if plans.fence.replace([MissionItem(*i[:2], 0, 1, *i[2:9], 1) for i in areas]) is not None:
+            continue  # it shuts home out
+        flown = [Item(1, 22, 0.0, 0.0, 0.0, 0.0, *around(rng), -5.0)]
+        for command in rng.choices((16, 18, 21, 31, 195), k=4):
+            turns, radius = (1.0, 2.0) if command == 18 else (0.0, 0.0)
+            flown.append(Item(1, command, turns, 0.0, radius, 0.0, *around(rng), -5.0))
+        assert plans.mission.replace([MissionItem(*i[:2], 0, 1, *i[2:9]) for i in flown]) is None
+        mine = fence_check.along_items(Uploaded("", "", tuple(flown), 60.0, None, fence=areas), None, [])
+        theirs = told.objection((0.0, 0.0, 0.0))
+        assert [text.removesuffix(": the vehicle doesn't start it") for text in mine[:1]] == (
+            [theirs] if theirs else []
+        )
+        verdicts.append(not theirs)
+    assert 5 < sum(verdicts) < len(verdicts) - 5
+
+
+def around(rng: random.Random) -> tuple[int, int]:
+    """x and y of a place near home."""
+    return round(rng.gauss(0.0, 2e4)), round(rng.gauss(0.0, 2e4))
 
 
 def test_a_streamed_flight_that_leaves_its_own_fence_is_refused_where_it_leaves() -> None:

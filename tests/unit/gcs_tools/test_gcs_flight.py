@@ -356,6 +356,15 @@ def test_a_refused_mission_is_reported_in_the_vehicles_words() -> None:
     assert not vehicle.armed
 
 
+def test_what_the_vehicle_says_again_and_again_is_noted_once() -> None:
+    vehicle = StandIn()
+    vehicle.refuse[mav.MAV_CMD_COMPONENT_ARM_DISARM] = (mav.MAV_RESULT_TEMPORARILY_REJECTED, "outside the fence")
+    made, _, pair = flight(ITEMS, vehicle=vehicle)
+    pair.run()
+    assert len([m for m in vehicle.commands if m.command == mav.MAV_CMD_COMPONENT_ARM_DISARM]) > 5
+    assert made.notes.count("vehicle says: outside the fence") == 1
+
+
 def test_a_refused_mission_without_a_word_is_reported_by_its_result() -> None:
     vehicle = StandIn()
     vehicle.refuse_mission = (mav.MAV_MISSION_NO_SPACE, "")
