@@ -63,7 +63,7 @@ class Instruments:
 
     def rate(self, wall_s: float) -> float | None:
         """Vehicle seconds per second over the last few; 0 where its clock stands still, None where it is unknown."""
-        if len(self._stamps) < 2:
+        if not self._stamps:
             return None
         (from_s, stamp0_s), (to_s, stamp1_s) = self._stamps[0], self._stamps[-1]
         if wall_s - to_s > STALE_S:

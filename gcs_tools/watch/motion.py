@@ -137,6 +137,6 @@ def _scale(curve: _Curve, known: list[float]) -> tuple[float, float]:
         return 0.0, gauges.nice(max(curve.least, most))
     least = min(known, default=0.0)
     spare = max(0.0, 0.5 * (curve.least - (most - least)))
-    if least - spare < 0.0 <= most and spare > 0.0:  # standing, or with the motors off
+    if least - spare < 0.0 and most > -0.1 * curve.least and spare > 0.0:  # standing, or with the motors off
         return min(0.0, least), min(0.0, least) + curve.least
     return least - spare, most + spare

@@ -77,6 +77,8 @@ class Seen:
                 asked = self._asked()
                 yield from client.set_intervals(self._wanted())
                 self.trouble = ""
+                for name in _CHOSEN if self.vehicle.position_m is None else ():
+                    client.request(name)  # of a vehicle whose clock stands still nothing flows
                 while asked == self._asked():
                     self._ping()
                     yield from self._why_not_ready()

@@ -25,6 +25,7 @@ class StandIn:
         self.position = (0.0, 0.0, 0.0)
         self.ready = True
         self.silent = False
+        self.flows = True  # its streams; they stand still with its clock
         self.intervals: dict[str, int] = {}
         self.items: list[Any] = []
         self.expected = 0
@@ -90,26 +91,30 @@ class StandIn:
             self._fly_items()
         if self._incoming is not None and now_s - self._asked_s > 0.25:
             self._ask()
-        ms = round(now_s * 1000)
-        x, y, z = self.position
         for name, interval in self.intervals.items():
-            if interval <= 0 or now_s < self._due.get(name, 0.0) - 1e-9:
+            if not self.flows or interval <= 0 or now_s < self._due.get(name, 0.0) - 1e-9:
                 continue
             self._due[name] = now_s + interval * 1e-6
-            if name in ("LOCAL_POSITION_NED", "POSITION_TARGET_LOCAL_NED"):
-                self.send(name, time_boot_ms=ms, x=x, y=y, z=z)
-            elif name == "SYS_STATUS":
-                check = mav.MAV_SYS_STATUS_PREARM_CHECK
-                health = check if self.ready else 0
-                self.send(name, onboard_control_sensors_present=check, onboard_control_sensors_health=health)
-            elif name == "DEBUG_VECT":
-                self.send(name, time_usec=ms * 1000, x=1.0, y=95.0, z=-2.0, name="YXZ_DEG")
-                self.send(name, time_usec=ms * 1000, x=5.0, y=6.0, z=11.0, name="THRUST_N")
-                self.send(name, time_usec=ms * 1000, x=-3.0, y=4.0, z=0.5, name="FLAP_DEG")
-            elif name == "MISSION_CURRENT":
-                self._tell_mission()
+            self.stream(name)
         out, self._out = self._out, []
         return [] if self.silent else out
+
+    def stream(self, name: str) -> None:
+        """Send what it has of one message."""
+        ms = round(self.now_s * 1000)
+        x, y, z = self.position
+        if name in ("LOCAL_POSITION_NED", "POSITION_TARGET_LOCAL_NED"):
+            self.send(name, time_boot_ms=ms, x=x, y=y, z=z)
+        elif name == "SYS_STATUS":
+            check = mav.MAV_SYS_STATUS_PREARM_CHECK
+            health = check if self.ready else 0
+            self.send(name, onboard_control_sensors_present=check, onboard_control_sensors_health=health)
+        elif name == "DEBUG_VECT":
+            self.send(name, time_usec=ms * 1000, x=1.0, y=95.0, z=-2.0, name="YXZ_DEG")
+            self.send(name, time_usec=ms * 1000, x=5.0, y=6.0, z=11.0, name="THRUST_N")
+            self.send(name, time_usec=ms * 1000, x=-3.0, y=4.0, z=0.5, name="FLAP_DEG")
+        elif name == "MISSION_CURRENT":
+            self._tell_mission()
 
     def _tell_mission(self) -> None:
         state = 5 if self._item >= len(self.items) else 3
@@ -176,6 +181,8 @@ class StandIn:
         elif m.command == mav.MAV_CMD_REQUEST_MESSAGE and int(m.param1) == codec.by_name("MESSAGE_INTERVAL").id:
             interval = self.intervals.get(codec.by_id(int(m.param2)).name, -1)
             self.send("MESSAGE_INTERVAL", message_id=int(m.param2), interval_us=interval)
+        elif m.command == mav.MAV_CMD_REQUEST_MESSAGE:
+            self.stream(codec.by_id(int(m.param1)).name)
 
     def _on_timesync(self, m: Any, _back: dict[str, int]) -> None:
         self.send("TIMESYNC", tc1=round(self.now_s * 1e9), ts1=m.ts1)

@@ -247,3 +247,12 @@ def test_one_heartbeat_a_second_goes_out_however_many_vehicles_there_are() -> No
         for data in air.station.poll(air.wall_s):
             heard += sum(frame.name == "HEARTBEAT" for frame in parser.feed(data))
     assert heard == 2
+
+
+def test_a_vehicle_whose_clock_stands_still_is_shown_as_it_stands() -> None:
+    vehicle = StandIn()
+    vehicle.flows = False
+    vehicle.position = (4.0, 0.0, 0.0)
+    screen = Air(vehicle).fly(4.0).screen()
+    assert row(screen, "position").startswith("position 4.000")
+    assert "stands still" in screen
