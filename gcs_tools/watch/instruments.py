@@ -110,15 +110,16 @@ class Instruments:
     def _changed(self, mode: str | None, armed: bool) -> None:
         if self._was is not None:
             if self._was[0] != mode:
-                self._note(f"mode {mode}")
+                self.note(f"mode {mode}")
             if self._was[1] != armed:
-                self._note("armed" if armed else "disarmed")
+                self.note("armed" if armed else "disarmed")
         self._was = mode, armed
 
     def _item_reached(self, m: Any) -> None:
-        self._note(f"item {m.seq + 1} reached")
+        self.note(f"item {m.seq + 1} reached")
 
-    def _note(self, text: str) -> None:
+    def note(self, text: str) -> None:
+        """Keep what was seen to happen now."""
         self.changes.append(Text(self._client.wall_s, SEEN, text))
 
     def _clock(self, stamp_s: float) -> None:

@@ -111,6 +111,11 @@ class Dashboard:
         if station.vehicles:
             return "others are heard: choose one by its number"
         if c.listens:
-            other = f"nothing arrives: start a vehicle with `sitl run`, which sends to {c.host}:14550 and 14540,\n"
-            return other + "or call it: --connect udpout:127.0.0.1:18570 (plus its instance)"
-        return f"nobody answers at {c.host}:{c.port}: `sitl run` listens at 18570 plus its instance, a swarm at 18300"
+            return (
+                f"nothing arrives at {c.host}:{c.port}: `sitl run` sends to 127.0.0.1:14550 and 14540,\n"
+                "or is called: --connect udpout:127.0.0.1:18570 (plus its instance)"
+            )
+        return (
+            f"nobody answers at {c.host}:{c.port}: `sitl run` listens at 18570 plus its instance,\n"
+            "`sitl swarm` at 18300; one started with --signing-key answers no other key"
+        )

@@ -72,12 +72,13 @@ class Seen:
         client = self.client
         while True:
             try:
-                yield from client.wait(lambda: not self.is_lost(client.wall_s), math.inf, "")
+                yield from self._until_heard()
                 yield from client.connect(math.inf)
                 asked = self._asked()
                 yield from client.set_intervals(self._wanted())
                 self.trouble = ""
-                for name in _CHOSEN if self.vehicle.position_m is None else ():
+                yield from client.pause(TURN_S)
+                for name in set(_CHOSEN) - self.traffic.names:
                     client.request(name)  # of a vehicle whose clock stands still nothing flows
                 while asked == self._asked():
                     self._ping()
@@ -87,6 +88,13 @@ class Seen:
                 self.trouble = "" if self.is_lost(client.wall_s) else str(error)
             if self.trouble:
                 yield from self._rest()
+
+    def _until_heard(self) -> Script[None]:
+        if not self.is_lost(self.client.wall_s):
+            return
+        since_s = self.vehicle.heard_s or self.client.wall_s
+        yield from self.client.wait(lambda: not self.is_lost(self.client.wall_s), math.inf, "")
+        self.instruments.note(f"heard again after {self.client.wall_s - since_s:.0f} s")
 
     def _rest(self) -> Script[None]:
         try:
@@ -106,7 +114,10 @@ class Seen:
         rate = max(1.0, self.instruments.rate(self.client.wall_s) or 1.0)
         if not 0.5 <= rate / self._scale <= 2.0:
             self._scale = rate
-        self._introductions = sum(text.introduces for text in self.vehicle.texts)
+        introductions = sum(text.introduces for text in self.vehicle.texts)
+        if introductions != self._introductions:
+            self._introductions = introductions
+            self.traffic.restart()
         return self.chosen, self._scale, self._introductions
 
     def _ping(self) -> None:

@@ -22,17 +22,21 @@ class Traffic:
     """Hears every frame of one vehicle."""
 
     def __init__(self) -> None:
-        self.frames = 0
+        self.names: set[str] = set()  # of all messages that ever came
         self._since_s: float | None = None
         self._recent: deque[tuple[float, Frame]] = deque()
 
     def hear(self, frame: Frame, wall_s: float) -> None:
         if self._since_s is None:
             self._since_s = wall_s
-        self.frames += 1
+        self.names.add(frame.name)
         self._recent.append((wall_s, frame))
         while self._recent[0][0] < wall_s - LOSS_WINDOW_S:
             self._recent.popleft()
+
+    def restart(self) -> None:
+        """The vehicle counts from the beginning."""
+        self._recent.clear()
 
     def flows(self, wall_s: float) -> list[Flow]:
         """By message, most bytes first; wall time counts."""

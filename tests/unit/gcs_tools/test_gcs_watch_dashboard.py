@@ -94,7 +94,9 @@ def test_a_lost_vehicle_says_since_when_and_is_asked_anew_when_it_is_back() -> N
     assert "LOST for 0:0" in screen
     assert row(screen, "position").startswith("position 1.000")
     vehicle.silent, vehicle.intervals = False, {}
-    assert "LOST" not in air.fly(3.0).screen()
+    screen = air.fly(3.0).screen()
+    assert "LOST" not in screen
+    assert "heard again after 6 s" in screen
     assert vehicle.intervals["LOCAL_POSITION_NED"] == _CHOSEN["LOCAL_POSITION_NED"]
 
 
@@ -122,6 +124,14 @@ def test_frames_that_never_came_are_counted_by_their_numbers() -> None:
     loss = air.seen.traffic.loss(air.wall_s)
     assert loss == pytest.approx(0.2, abs=0.02)
     assert "lost 20" in air.screen() or "lost 19" in air.screen()
+
+
+def test_a_vehicle_that_started_again_has_lost_nothing_by_counting_anew() -> None:
+    air = Air(flying()).fly(5.0)
+    encoder = air.vehicles[0].encoder
+    encoder.sequence = (encoder.sequence + 100) & 0xFF
+    air.vehicles[0].say("SITL 1: simulated 'tail-sitter'", mav.MAV_SEVERITY_INFO)
+    assert "lost 0.0 %" in air.fly(3.0).screen()
 
 
 def test_the_round_trip_is_told() -> None:
