@@ -135,7 +135,7 @@ class _Listener:
         }
         self._answers: list[Any] = []
         self._ask_s = self._paused_ask_s = float("-inf")
-        self._parameters_asked = 0  # number of the event after which they were
+        self._parameters_asked = self._plans_asked = 0  # number of the event after which they were
 
     def poll(self, wall_s: float) -> None:
         for topic, subscriber in self._subscribers.items():
@@ -160,9 +160,12 @@ class _Listener:
         vehicle = self._vehicle
         if vehicle.description is None:
             self._question(wall_s, "*")
+        elif self._plans_asked != (number := self._newest("plan")):
+            if self._question(wall_s, "mission"):
+                self._plans_asked = number
         elif vehicle.mission is not None and vehicle.mode and vehicle.mode.mission_plan_id != vehicle.mission.plan_id:
             self._question(wall_s, "mission")
-        elif self._parameters_asked != (number := self._newest_change()):
+        elif self._parameters_asked != (number := self._newest("parameter")):
             if self._question(wall_s, "parameters"):
                 self._parameters_asked = number
         elif vehicle.mode is not None and vehicle.mode.paused and wall_s >= self._paused_ask_s and not self._answers:
@@ -170,9 +173,9 @@ class _Listener:
             for topic in topics.SAMPLED:
                 self._get(topic)
 
-    def _newest_change(self) -> int:
-        """Number of the newest event that tells of a changed parameter."""
-        return next((e.number for e in reversed(self._vehicle.events) if e.kind == "parameter"), 0)
+    def _newest(self, kind: str) -> int:
+        """Number of the newest event of a kind."""
+        return next((e.number for e in reversed(self._vehicle.events) if e.kind == kind), 0)
 
     def _question(self, wall_s: float, topic: str) -> bool:
         """Ask unless an answer is under way or it was only just asked; whether it was."""

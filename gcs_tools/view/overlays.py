@@ -9,6 +9,7 @@ from viser import SceneApi
 
 from gcs_tools.view import forces
 from gcs_tools.view.airframe_mesh import Dimensions
+from gcs_tools.view.fence_lines import FenceLines
 from gcs_tools.view.history import INDEX
 from gcs_tools.view.mission_path import MissionPath
 from gcs_tools.view.topics import Triple
@@ -56,6 +57,7 @@ class Shown(NamedTuple):
     trail: bool = True
     reference: bool = True
     mission: bool = True
+    fence: bool = True
     wind: bool = True
     wake: bool = True
     forces: bool = False
@@ -76,6 +78,7 @@ class Overlays:
         scene.add_label(f"{root}/home/label", "home", font_screen_scale=0.8)
         self._ground_down_m = ground_down_m
         self._mission = MissionPath(scene, root, ground_down_m)
+        self._fence = FenceLines(scene, root, ground_down_m)
         self._name = scene.add_label(
             f"{root}/air/name", "", font_screen_scale=0.9, anchor="top-center", position=(0.0, 0.0, 0.24), visible=False
         )
@@ -97,7 +100,7 @@ class Overlays:
         self._trail.visible, self._reference.visible = shown.trail, shown.reference
         self._shown = shown
         self._wind.visible = self._wind_label.visible = self._forces.visible = False  # until there is something to show
-        self._mission.visible = shown.mission
+        self._mission.visible, self._fence.visible = shown.mission, shown.fence
         self._added = 0
 
     def name(self, text: str) -> None:
@@ -115,6 +118,7 @@ class Overlays:
     def update_slowly(self, vehicle: Vehicle) -> None:
         """What need not follow every instant."""
         self._mission.update(vehicle)
+        self._fence.update(vehicle)
         if self._shown.wind and vehicle.instant is not None:
             self._draw_wind(vehicle.instant.state.wind_N_m_s)
         if vehicle.mode is not None:

@@ -134,10 +134,18 @@ class Item(msgspec.Struct, frozen=True, gc=False):
     position_N_m: Triple | None
 
 
+class Area(msgspec.Struct, frozen=True, gc=False):
+    inclusion: bool
+    corners_N_m: list[tuple[float, float]]
+    radius_m: float | None
+
+
 class Mission(msgspec.Struct, frozen=True):
     now_us: int
     plan_id: int
     items: list[Item]
+    fence: list[Area] = []
+    rally_N_m: list[Triple] = []
 
 
 class Description(msgspec.Struct, frozen=True):

@@ -28,6 +28,7 @@ class ViewTab:
                 "trail": gui.add_checkbox("flown path", True),
                 "reference": gui.add_checkbox("reference", True),
                 "mission": gui.add_checkbox("mission", True),
+                "fence": gui.add_checkbox("fence", True),
                 "wind": gui.add_checkbox("wind", True),
                 "wake": gui.add_checkbox("slipstreams", True),
                 "forces": gui.add_checkbox("forces", False),

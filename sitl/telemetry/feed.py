@@ -108,7 +108,7 @@ class Feed:
             keys.LOOP: loop,
             keys.EVENTS: self._events,
             keys.PARAMETERS: lambda: messages.parameters(vehicle.now_us, vehicle.parameters),
-            keys.MISSION: lambda: messages.mission(vehicle.now_us, vehicle.plans.mission, vehicle.plans.places),
+            keys.MISSION: lambda: messages.mission(vehicle.now_us, vehicle.plans),
             keys.DESCRIPTION: lambda: messages.description(
                 vehicle.description(), instance, vehicle.parameters["SIM_TLM_RATE"]
             ),

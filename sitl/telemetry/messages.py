@@ -8,12 +8,14 @@ import msgspec
 
 from sitl.frames import heading, quaternion_to_yxz
 from sitl.geodesy import to_global
+from sitl.onboard.fence import Area
 from sitl.onboard.mission_items import ItemCommand, has_place
 from sitl.onboard.modes import Event
 from sitl.telemetry.keys import TOPICS
 from sitl.telemetry.schema import (
     VERSION,
     ActuatorsMessage,
+    AreaMessage,
     AttitudeMessage,
     EventMessage,
     EventsMessage,
@@ -35,9 +37,8 @@ if TYPE_CHECKING:
     from sitl.geodesy import GeoPoint
     from sitl.model.rigid_body import State
     from sitl.navigation import NavState
-    from sitl.onboard.mission import Mission
     from sitl.onboard.parameters import Parameters
-    from sitl.onboard.places import Places
+    from sitl.onboard.plans import Plans
     from sitl.snapshot import Snapshot
 
 ITEMS_MAX = 500  # of a mission told; building more takes longer than the loop has
@@ -226,15 +227,24 @@ def events(next_number: int, log: Iterable[Event]) -> EventsMessage:
     return EventsMessage(next_number, [event(e) for e in log])
 
 
-def mission(now_us: int, stored: "Mission", places: "Places") -> MissionMessage:
-    """The first ITEMS_MAX items, with the point of those that have one."""
-    items = []
+def mission(now_us: int, plans: "Plans") -> MissionMessage:
+    """The first ITEMS_MAX of everything: items, with the point of those that have one, areas and rally points."""
+    stored, places, items = plans.mission, plans.places, []
     for index, item in enumerate(stored.items[:ITEMS_MAX]):
         point = places.of(item, places.home_N) if has_place(item) else None
         if point is not None and not all(map(math.isfinite, point)):
             point = None
         items.append(MissionItemMessage(index, ItemCommand(item.command).name.lower().replace("_", " "), point))
-    return MissionMessage(now_us, stored.plan_id, len(stored.items), items)
+    areas = [_area(area) for area in plans.fence.areas[:ITEMS_MAX]]
+    rally = plans.rally.points_N(places)[:ITEMS_MAX]
+    return MissionMessage(now_us, stored.plan_id, len(stored.items), items, areas, rally)
+
+
+def _area(area: Area) -> AreaMessage:
+    if area.sides is None:
+        return AreaMessage(area.item, area.inclusion, area.group, [area.centre_N], area.radius_m)
+    corners = list(zip(area.sides.north_m.tolist(), area.sides.east_m.tolist(), strict=True))
+    return AreaMessage(area.item, area.inclusion, area.group, corners, None)
 
 
 def parameters(now_us: int, p: "Parameters", names: Iterable[str] | None = None) -> ParametersMessage:

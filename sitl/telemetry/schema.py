@@ -168,8 +168,18 @@ class MissionItemMessage(msgspec.Struct, frozen=True, gc=False):
     position_N_m: Triple | None
 
 
+class AreaMessage(msgspec.Struct, frozen=True, gc=False):
+    item: int
+    inclusion: bool
+    group: int
+    corners_N_m: list[tuple[float, float]]
+    radius_m: float | None
+
+
 class MissionMessage(msgspec.Struct, frozen=True):
     now_us: int
     plan_id: int
     total: int
     items: list[MissionItemMessage]
+    fence: list[AreaMessage]
+    rally_N_m: list[Triple]

@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable
 
 import pytest
-from daemon_process import BOOT_LIMIT_S, Client, Daemon, free_instance
+from daemon_process import BOOT_LIMIT_S, Client, Daemon, free_instance, mavlink
 
 from gcs_tools.view.feed import Feed
 
@@ -23,7 +23,7 @@ def until(feed: Feed, true: Callable[[], object], what: str, limit_s: float = LI
         time.sleep(0.02)
 
 
-def test_a_paused_vehicle_is_known_and_each_step_of_it_seen(tmp_path) -> None:
+def test_a_paused_vehicle_is_known_and_each_step_and_each_new_plan_of_it_seen(tmp_path) -> None:
     instance = free_instance(INSTANCES)
     with Daemon(tmp_path, "--set", "SIM_PAUSE=1", instance=instance, zenoh=True) as daemon:
         feed = Feed([daemon.zenoh_endpoint])
@@ -36,8 +36,19 @@ def test_a_paused_vehicle_is_known_and_each_step_of_it_seen(tmp_path) -> None:
             client = Client(daemon)
             client.until_ready()
             client.set("SIM_STEP_MS", 40, integer=True)
-            client.close()
             until(feed, lambda: vehicle.instant.now_us == before_us + 40_000, "the step is seen")
+            assert vehicle.mission.rally_N_m == []
+            client.request(
+                mavlink.MAVLink_mission_count_message(instance + 1, 1, 1, mission_type=2),
+                lambda m: m.get_type() == "MISSION_REQUEST_INT",
+            )
+            rally = (instance + 1, 1, 0, 1, 5100, 0, 1, 0, 0, 0, 0, 30_000, -20_000, -4.0)
+            client.request(
+                mavlink.MAVLink_mission_item_int_message(*rally, mission_type=2),
+                lambda m: m.get_type() == "MISSION_ACK",
+            )
+            client.close()
+            until(feed, lambda: vehicle.mission.rally_N_m == [(3.0, -2.0, -4.0)], "a new rally point is seen")
         finally:
             feed.close()
 

@@ -13,16 +13,16 @@ from sitl.frames import quaternion_from_yxz, standing
 from sitl.geodesy import GeoPoint
 from sitl.model.rigid_body import State
 from sitl.navigation import NavState
-from sitl.onboard.events import EventLog
-from sitl.onboard.mission import Mission, MissionState
+from sitl.onboard.fence import FenceCommand
+from sitl.onboard.mission import MissionState
 from sitl.onboard.mission_items import ItemCommand
 from sitl.onboard.modes import Event, EventKind, Landed, Mode, Severity
-from sitl.onboard.places import Places
 from sitl.onboard.plan import Frame, MissionItem
-from sitl.onboard.store import MemoryStore
+from sitl.onboard.plans import Plans
 from sitl.quaternion import rotate
 from sitl.snapshot import Battery, Snapshot
 from sitl.telemetry import keys, messages
+from sitl.vehicle import Vehicle, load_vehicle
 
 PHI, THETA, PSI = math.radians(10.0), math.radians(95.0), math.radians(-5.0)
 Q = quaternion_from_yxz(PHI, THETA, PSI)
@@ -187,9 +187,33 @@ def test_the_documented_conversion_to_three_js_keeps_rotations() -> None:
         assert _rotated((y, -z, -x, w), vector(v)) == pytest.approx(vector(rotate(Q, v)))
 
 
+def stored_plans() -> Plans:
+    """Of a vehicle that has none yet."""
+    return Vehicle(load_vehicle("yawsitter"), home=GeoPoint(55.0, 37.0, 190.0)).plans
+
+
+def test_the_fences_areas_and_the_rally_points_are_told_with_the_mission_whatever_frame_they_came_in() -> None:
+    plans = stored_plans()
+    rest = 0, 1, 3.0, 1.0, 0.0, 0.0
+    triangle = [(550001000, 370000000), (549999000, 370003000), (549999000, 369997000)]
+    areas = [MissionItem(Frame.GLOBAL_INT, FenceCommand.POLYGON_INCLUSION, *rest, x, y, 0.0, 1) for x, y in triangle]
+    areas.append(MissionItem(Frame.LOCAL_NED, FenceCommand.CIRCLE_EXCLUSION, *rest, 80_000, -60_000, 0.0, 1))
+    assert plans.fence.replace(areas) is None
+    rally = MissionItem(Frame.GLOBAL_RELATIVE_ALT_INT, 5100, 0, 1, 0.0, 0.0, 0.0, 0.0, 550001000, 370000000, 20.0, 2)
+    assert plans.rally.replace([rally]) is None
+    told = json.loads(messages.encode(messages.mission(7, plans)))
+    polygon, circle = told["fence"]
+    assert (polygon["item"], polygon["inclusion"], polygon["group"], polygon["radius_m"]) == (0, True, 1, None)
+    assert polygon["corners_N_m"][0] == pytest.approx([11.1, 0.0], abs=0.1)
+    assert len(polygon["corners_N_m"]) == 3
+    assert circle == {"item": 3, "inclusion": False, "group": 1, "corners_N_m": [[8.0, -6.0]], "radius_m": 3.0}
+    [point] = told["rally_N_m"]
+    assert point == pytest.approx([11.1, 0.0, -20.0], abs=0.1)
+
+
 def test_the_mission_tells_where_its_items_are_whatever_frame_they_came_in() -> None:
-    places = Places(GeoPoint(55.0, 37.0, 190.0))
-    mission = Mission(MemoryStore(), EventLog())
+    plans = stored_plans()
+    mission = plans.mission
     flat = (0, 1, 0.0, 0.0, 0.0, math.nan)
     items = [
         MissionItem(Frame.LOCAL_NED, ItemCommand.TAKEOFF, *flat, 0, 0, -5.0),
@@ -197,7 +221,7 @@ def test_the_mission_tells_where_its_items_are_whatever_frame_they_came_in() -> 
         MissionItem(Frame.MISSION, ItemCommand.RETURN_TO_LAUNCH, 0, 1, 0.0, 0.0, 0.0, 0.0, 0, 0, 0.0),
     ]
     assert mission.replace(items) is None
-    told = json.loads(messages.encode(messages.mission(7, mission, places)))
+    told = json.loads(messages.encode(messages.mission(7, plans)))
     assert (told["now_us"], told["plan_id"], told["total"]) == (7, mission.plan_id, 3)
     assert [item["command"] for item in told["items"]] == ["takeoff", "waypoint", "return to launch"]
     assert told["items"][0]["position_N_m"] == [0.0, 0.0, -5.0]
@@ -206,8 +230,9 @@ def test_the_mission_tells_where_its_items_are_whatever_frame_they_came_in() -> 
 
 
 def test_of_a_very_long_mission_only_the_first_items_are_told() -> None:
-    mission = Mission(MemoryStore(), EventLog())
+    plans = stored_plans()
+    mission = plans.mission
     item = MissionItem(Frame.LOCAL_NED, ItemCommand.WAYPOINT, 0, 1, 0.0, 0.0, 0.0, math.nan, 0, 0, -5.0)
     assert mission.replace([item] * (messages.ITEMS_MAX + 1)) is None
-    told = messages.mission(0, mission, Places(GeoPoint(55.0, 37.0, 190.0)))
+    told = messages.mission(0, plans)
     assert (told.total, len(told.items)) == (messages.ITEMS_MAX + 1, messages.ITEMS_MAX)
