@@ -34,11 +34,19 @@ _FIRSTS = (165, 70)  # instances: 85 from each are taken
 _RATE = "ATTITUDE"  # the stream that is counted
 
 
+class Turns(Recorded):
+    """How late each began, and the processor time that it took."""
+
+    def __init__(self, turn_s: float) -> None:
+        super().__init__(turn_s)
+        self.work_s: list[float] = []
+
+
 def measure(quick: bool) -> Iterator[Figure]:
     logging.getLogger("sitl").setLevel(logging.WARNING)
     sizes = SIZES[::2] if quick else SIZES
     spent: dict[int, list[float]] = {size: [] for size in sizes}
-    late: dict[int, Recorded] = {}
+    turns: dict[int, Turns] = {}
     told_Hz: dict[int, float] = {}
     beside: list[float] = []  # how late a loop was that only sleeps
     with contextlib.ExitStack() as stack:
@@ -47,7 +55,7 @@ def measure(quick: bool) -> Iterator[Figure]:
         for size in sizes:
             loops[size] = stack.enter_context(_hovering(size, first))
             first += size
-            late[size] = loops[size].lateness = Recorded(loops[size].lateness.turn_s)
+            turns[size] = _timed(loops[size])
         for _ in range(WINDOWS):
             for size, loop in loops.items():
                 spent_s, told_Hz[size] = _window(loop)
@@ -55,6 +63,7 @@ def measure(quick: bool) -> Iterator[Figure]:
                 beside += bare(WINDOW_S, SWARM_TURN_S)
         largest = loops[sizes[-1]]
         endpoint = f"tcp/127.0.0.1:{7447 + largest.members[0].endpoint.system_id - 1}"
+        largest.lateness = Recorded(SWARM_TURN_S)  # not to be told
         with listener(endpoint, "read"):
             _turn(largest, 1.0)
             subscribed_s, _ = _window(largest)
@@ -71,10 +80,12 @@ def measure(quick: bool) -> Iterator[Figure]:
     )
     bare_p50, bare_p99 = (quantile(beside, q) * 1e3 for q in (0.5, 0.99))
     for size in sizes:
-        p50, p99 = (quantile(late[size].late_s, q) * 1e3 for q in (0.5, 0.99))
+        p50, p99 = (quantile(turns[size].late_s, q) * 1e3 for q in (0.5, 0.99))
         ratio = f"ratio {p50 / bare_p50:.1f} / {p99 / bare_p99:.1f}"
         measured = f"{p50:.2f} / {p99:.2f} ms; bare {bare_p50:.2f} / {bare_p99:.2f} ms; {ratio}"
         yield told(f"lateness p50 / p99, {size} vehicles", measured)
+        p50, p99, longest = (quantile(turns[size].work_s, q) * 1e3 for q in (0.5, 0.99, 1.0))
+        yield told("  a turn's processor time p50 / p99 / longest", f"{p50:.1f} / {p99:.1f} / {longest:.1f} ms")
 
 
 def _free_first(count: int) -> int:
@@ -108,6 +119,22 @@ def _hovering(count: int, first: int) -> Iterator[Loop[Any]]:
             raise BenchmarkError("they are not in the air")
         assembly.settle_garbage()
         yield loop
+
+
+def _timed(loop: Loop[Any]) -> Turns:
+    """What the loop's turns are like from here on."""
+    turns = loop.lateness = Turns(loop.lateness.turn_s)
+    turn = loop.turn
+
+    def timed(wall_s: float) -> float:
+        start_s = time.thread_time()
+        wake_s = turn(wall_s)
+        if wall_s >= turns.since_s:
+            turns.work_s.append(time.thread_time() - start_s)
+        return wake_s
+
+    loop.turn = timed
+    return turns
 
 
 def _turn(loop: Loop[Any], seconds: float) -> None:
