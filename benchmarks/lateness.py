@@ -16,12 +16,11 @@ from pathlib import Path
 
 from benchmarks.figure import Figure, quantile, told
 from benchmarks.processes import BenchmarkError, free_instance, ground, listener, running, start
-from sitl.daemon import assembly
+from sitl.daemon import assembly, recorder
 from sitl.daemon.clock import TURN_S, Lateness
 from sitl.daemon.config import RunConfig, Setup
 from sitl.daemon.loop import Loop
 from sitl.daemon.main import wall_clock
-from sitl.daemon.recorder import Recorder
 from sitl.daemon.udp import Sockets
 
 SEGMENT_S = 4.0
@@ -86,11 +85,9 @@ def assembled(config: RunConfig) -> Iterator[Loop]:
         built = assembly.build(setup)
         stack.callback(built.close)
         [vehicle] = built.vehicles
-        recorder = None
-        if config.record:
-            recorder = Recorder(config.log_dir, config.instance)
-            stack.callback(recorder.close)
-        loop = assembly.build_loop(setup, built.vehicles, sockets, built.publishers, recorder, clock)
+        recorders = recorder.start(setup.vehicles)
+        stack.callback(recorder.close, recorders)
+        loop = assembly.build_loop(setup, built.vehicles, sockets, built.publishers, recorders, clock)
         vehicle.advance(100_000)
         vehicle.commander.takeoff()
         vehicle.commander.arm()

@@ -108,7 +108,7 @@ def _hovering(count: int, first: int) -> Iterator[Loop[Any]]:
         stack.callback(sockets.close)
         built = assembly.build(setup)
         stack.callback(built.close)
-        loop = assembly.build_loop(setup, built.vehicles, sockets, built.publishers, None, clock)
+        loop = assembly.build_loop(setup, built.vehicles, sockets, built.publishers, (), clock)
         for vehicle in built.vehicles:
             vehicle.advance(100_000)
             vehicle.commander.takeoff()

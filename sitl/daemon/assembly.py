@@ -2,6 +2,7 @@
 
 import gc
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 from sitl.daemon.boot import Boot
@@ -126,20 +127,23 @@ def build_loop(
     vehicles: Sequence[Vehicle],
     sockets: Sockets[Place],
     publishers: Sequence[Publisher],
-    recorder: Recorder | None,
+    recorders: Sequence[Recorder],
     clock: Callable[[], float],
     signer: Signer | None = None,
 ) -> Loop[Place]:
     """The loop with everything attached, and each function in it run once so that none compiles in flight.
 
+    publishers, recorders: one for each vehicle, or none at all.
     A vehicle of several that is told to reboot is built again in its place; a lone one ends the loop.
     """
     swarming = setup.shared is not None
     settings = {config.system_id: config for config in setup.vehicles}
+    recorded = {recorder.instance: recorder for recorder in recorders}
 
     def member(config: RunConfig, vehicle: Vehicle, publisher: Publisher | None) -> Member[Place]:
         phase_us = (config.instance - setup.first.instance) * SLICE_US  # not all in the same turn
         profile = Profile(setup.rate_max_Hz, (PortKind.ONBOARD,), phase_us) if swarming else FULL
+        recorder = recorded.get(config.instance)
         endpoint = build_endpoint(config, vehicle, recorder, signer, profile)
         ports = [*config.local_ports, *([Port.SHARED] if swarming else [])]
         places = {PortKind(port.value): setup.place(config, port) for port in ports}
@@ -161,7 +165,10 @@ def build_loop(
     dealer = None
     if swarming:
         limits = shared(DAEMON, len(members))
-        dealer = setup.shared_place, SharedPort((m.endpoint for m in members), limits, signer)
+        dealer = (
+            setup.shared_place,
+            SharedPort((m.endpoint for m in members), limits, signer, forward=setup.first.forward),
+        )
     loop = Loop(
         members,
         sockets,
@@ -198,7 +205,7 @@ def settle_garbage() -> None:
     gc.freeze()
 
 
-def banner(setup: Setup, vehicle: Vehicle, zenoh: bool, recorder: Recorder | None) -> str:
+def banner(setup: Setup, vehicle: Vehicle, zenoh: bool) -> str:
     first, last = setup.first, setup.vehicles[-1]
     several = len(setup.vehicles) > 1
 
@@ -207,6 +214,9 @@ def banner(setup: Setup, vehicle: Vehicle, zenoh: bool, recorder: Recorder | Non
         numbers = f"{number}" if not several else f"{number} ... {last.local_ports[port][1]}"
         whom = ", ".join(dict.fromkeys(f"{h}:{n}" for v in setup.vehicles for h, n in v.static_peers.get(port, ())))
         return f"UDP {host}:{numbers}" + (f" -> {whom}" if whom else ", for those who call")
+
+    def folders(of: Callable[[RunConfig], Path | None]) -> str:
+        return f"{of(first)} ... {of(last)}" if several else f"{of(first)}"
 
     speed = f"{first.speed:g} x real time" if first.speed else "as fast as possible"
     who = f"instance {first.instance}, system id {first.system_id}"
@@ -224,10 +234,9 @@ def banner(setup: Setup, vehicle: Vehicle, zenoh: bool, recorder: Recorder | Non
         f"  onboard          {link(Port.ONBOARD)}",
         *([f"  viewer           {link(Port.VIEWER)}"] if first.hil_viewer else []),
         f"  Zenoh            {f'{zenoh_endpoint(first)}, keys yawsitter/{keys_of}/...' if zenoh else 'off'}",
-        f"  state            {first.state_dir}{f' ... {last.state_dir}' if several else ''}",
+        f"  state            {folders(lambda v: v.state_dir)}",
         *([f"  signing key      {first.signing_key}"] if first.signing_key else []),
         *(["  forwarding       between all peers"] if first.forward else []),
+        *([f"  recording        each flight, in {folders(lambda v: v.log_dir)}"] if first.record else []),
     ]
-    if recorder is not None:
-        lines.append(f"  recording        each flight, in {recorder.folder}")
     return "\n".join(lines)

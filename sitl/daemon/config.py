@@ -19,6 +19,7 @@ ONBOARD_PEER_PORT = 14540
 ONBOARD_PEER_LAST = 14549  # shared by instance 9 and all above, as PX4's simulator does: 14550 is the ground stations'
 VIEWER_PORT = 19450  # as PX4's simulation in hardware
 VIEWER_PEER_PORT = 19410
+VIEWER_LAST = VIEWER_PORT - VIEWER_PEER_PORT - 1  # instance with a viewer: the next one's would be instance 0
 LOOPBACK = "127.0.0.1"
 WIND_MAX_M_S = 30.0
 GUST_MAX_M_S = 10.0
@@ -281,10 +282,19 @@ def parse_listen(text: str) -> str:
         ) from None
 
 
-def check(config: RunConfig) -> RunConfig:
+def check(setup: Setup) -> Setup:
     """Raise SettingError for settings that are right each by itself but not together."""
-    if ipaddress.IPv4Address(config.listen).is_loopback:
-        for host, port in config.ground_stations:
-            if not ipaddress.IPv4Address(host).is_loopback:
-                raise SettingError(f"--gcs {host}:{port} can't be reached from {config.listen}: add --listen 0.0.0.0")
-    return config
+    for config in setup.vehicles:
+        if config.hil_viewer and config.instance > VIEWER_LAST:
+            port, other = VIEWER_PEER_PORT + config.instance, config.instance - VIEWER_LAST - 1
+            raise SettingError(
+                f"--hil-viewer: instance {config.instance} would send to UDP {port}, where instance {other} listens: "
+                f"only instances 0 to {VIEWER_LAST} can be viewed"
+            )
+        if ipaddress.IPv4Address(config.listen).is_loopback:
+            for host, port in config.ground_stations:
+                if not ipaddress.IPv4Address(host).is_loopback:
+                    raise SettingError(
+                        f"--gcs {host}:{port} can't be reached from {config.listen}: add --listen 0.0.0.0"
+                    )
+    return setup

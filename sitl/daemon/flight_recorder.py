@@ -36,7 +36,7 @@ class FlightRecorder:
         """Room for the control steps until then; None between flights."""
         vehicle, recorder = self._vehicle, self._recorder
         flying = recorder.flight is not None
-        if vehicle.commander.armed and not flying and recorder.works:
+        if vehicle.commander.armed and not flying and recorder.pipe.works:
             self._begin(unix_s)
         elif flying and not vehicle.commander.armed:
             recorder.end()

@@ -25,7 +25,8 @@ from mcap.writer import Writer
 from sitl.closed_loop import TRACE_COLUMNS, Traced, traced
 from sitl.control.cascade import Command
 from sitl.control.reference import Reference
-from sitl.daemon.recorder import BEGIN, END, FRAME, HEAD, MESSAGE, STEPS, TOPIC, Flight
+from sitl.daemon.flight_pipe import BEGIN, END, FRAME, HEAD, STEPS, TOPIC
+from sitl.daemon.recorder import MESSAGE, Flight
 from sitl.geodesy import GeoPoint
 from sitl.model.derivative import by_cause
 from sitl.model.rigid_body import State
@@ -108,7 +109,8 @@ def _plain(part: Any) -> Any:
 class FlightFiles:
     """The two files of one flight."""
 
-    def __init__(self, folder: Path, flight: Flight) -> None:
+    def __init__(self, flight: Flight) -> None:
+        folder = Path(flight.folder)
         self._flight = flight
         self._origin = GeoPoint(*flight.origin)
         self._tlog = (folder / f"{flight.name}.tlog").open("xb")
@@ -174,27 +176,29 @@ def make_room(folder: Path) -> None:
             path.unlink(missing_ok=True)
 
 
-def incoming(source: BinaryIO) -> Iterator[tuple[bytes, bytes]]:
-    """What comes in, whole."""
+def incoming(source: BinaryIO) -> Iterator[tuple[bytes, int, bytes]]:
+    """What comes in, whole: kind, whose and what."""
     while len(head := source.read(HEAD.size)) == HEAD.size:
-        kind, size = HEAD.unpack(head)
+        kind, instance, size = HEAD.unpack(head)
         data = source.read(size)
         if len(data) < size:
             return
-        yield kind, data
+        yield kind, instance, data
 
 
-def write(folder: Path, source: BinaryIO, done: Callable[[str], None]) -> None:
-    """Flights from `source` into `folder` until it ends; `done` is told which are on disk."""
-    files: FlightFiles | None = None
+def write(source: BinaryIO, done: Callable[[str], None]) -> None:
+    """Flights from `source` until it ends, one of each vehicle at a time; `done` is told which are on disk."""
+    under_way: dict[int, FlightFiles] = {}
     try:
-        for kind, data in incoming(source):
+        for kind, instance, data in incoming(source):
             if kind == BEGIN:
-                make_room(folder)
-                files = FlightFiles(folder, Flight(**msgspec.json.decode(data)))
-            elif files is None:
+                flight = Flight(**msgspec.json.decode(data))
+                make_room(Path(flight.folder))
+                under_way[instance] = FlightFiles(flight)
+            files = under_way.get(instance)
+            if files is None:
                 continue
-            elif kind == FRAME:
+            if kind == FRAME:
                 files.frame(data)
             elif kind == STEPS:
                 files.steps(data)
@@ -202,12 +206,12 @@ def write(folder: Path, source: BinaryIO, done: Callable[[str], None]) -> None:
                 number, now_us = MESSAGE.unpack_from(data)
                 files.message(keys.TOPICS[number], now_us, data[MESSAGE.size :])
             elif kind == END:
+                del under_way[instance]
                 done(files.close())
-                files = None
-            if files is not None:
-                files.flush()
+                continue
+            files.flush()
     finally:
-        if files is not None:
+        for files in under_way.values():
             done(files.close())
 
 
@@ -222,9 +226,9 @@ def main() -> int:
     with contextlib.suppress(AttributeError):
         os.nice(NICE)
     try:
-        write(Path(sys.argv[1]), sys.stdin.buffer, tell)
+        write(sys.stdin.buffer, tell)
     except OSError as error:
-        print(f"recording stopped: {error.filename or sys.argv[1]}: {error.strerror}", file=sys.stderr)
+        print(f"recording stopped: {error.filename}: {error.strerror}", file=sys.stderr)
         return 1
     return 0
 

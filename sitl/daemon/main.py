@@ -6,12 +6,13 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
 from sitl.daemon import config as settings
+from sitl.daemon import recorder as recording
 from sitl.daemon.boot import Boot
 from sitl.daemon.config import Place, RunConfig, SettingError, Setup
 from sitl.daemon.lock import StateLock
@@ -105,8 +106,8 @@ def main(setup: Setup, verbose: bool = False) -> int:
     logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", level=logging.INFO, stream=sys.stderr)
     if verbose:
         log.setLevel(logging.DEBUG)
-    config = settings.check(setup.first)
-    setup = setup.resolved()
+    setup = settings.check(setup).resolved()
+    config = setup.first
     stop = Stop()
     clock = wall_clock()
     folders = [vehicle.state_dir for vehicle in setup.vehicles if vehicle.state_dir is not None]
@@ -114,14 +115,13 @@ def main(setup: Setup, verbose: bool = False) -> int:
     sockets: Sockets[Place] = Sockets(setup.sockets, config.instance)
     boot: Boot[Place] = Boot(sockets, Identity(config.identity), setup.voices, setup.static_peers, signer)
     boot.turn(clock())
-    recorder = None
+    recorders: list[Recorder] = []
     locks: list[StateLock] = []
     construction = Construction(setup)
     try:
         for folder in folders:
             locks.append(_locked(folder))
-        if config.record:
-            recorder = Recorder(setup.first.log_dir, config.instance)
+        recorders = recording.start(setup.vehicles)
         construction.start()
         while construction.is_alive() and not stop():
             boot.turn(clock())
@@ -133,12 +133,11 @@ def main(setup: Setup, verbose: bool = False) -> int:
         if construction.failure is not None:
             raise construction.failure
         assert construction.built is not None
-        _fly(setup, construction.built, sockets, recorder, boot, stop, clock, signer)
+        _fly(setup, construction.built, sockets, recorders, boot, stop, clock, signer)
     finally:
         if construction.built is not None:
             construction.built.close()
-        if recorder is not None:
-            recorder.close()
+        recording.close(recorders)
         for lock in locks:
             lock.close()
         sockets.close()
@@ -149,7 +148,7 @@ def _fly(
     setup: Setup,
     built: "Built",
     sockets: Sockets[Place],
-    recorder: Recorder | None,
+    recorders: Sequence[Recorder],
     boot: Boot[Place],
     stop: Stop,
     clock: Callable[[], float],
@@ -160,9 +159,9 @@ def _fly(
     from sitl.daemon.loop import Ending
 
     vehicles = built.vehicles
-    log.info("%s", assembly.banner(setup, vehicles[0], built.session is not None, recorder))
+    log.info("%s", assembly.banner(setup, vehicles[0], built.session is not None))
     while True:
-        loop = assembly.build_loop(setup, vehicles, sockets, built.publishers, recorder, clock, signer)
+        loop = assembly.build_loop(setup, vehicles, sockets, built.publishers, recorders, clock, signer)
         assembly.introduce(loop, boot, clock())
         assembly.settle_garbage()
         ending = loop.run(stop)

@@ -51,6 +51,7 @@ has the ports, system id and state folder of instance I+k, and flies as it would
   UDP 18570+I+k    vehicle k alone, for whoever calls
   UDP 14580+I+k    vehicle k for onboard computers, heartbeating to 127.0.0.1:14540+I+k (14549 at most); streams to
                    whoever answers
+  UDP 19450+I+k    with --hil-viewer, sending vehicle k's true state to 127.0.0.1:19410+I+k (instances 0 to 39)
   TCP 7447+I       one Zenoh session with the keys yawsitter/I/... to yawsitter/I+N-1/...
 
 {VEHICLES}"""
@@ -61,6 +62,7 @@ examples:
   sitl swarm 50 --vehicle yawsitter-real --rate 5  fifty, with five messages a second of each stream
   sitl swarm 9 --formation examples/formations/v.yaml
   sitl swarm 4 --instance 20 --speed max --no-zenoh
+  sitl swarm 9 --record logs                       each vehicle's flights in a folder of its own in logs
   gcs fly missions/rectangle.yaml --system 3       the third of them flies (in another terminal)
   python examples/formation.py v                   all of them fly in formation
 
@@ -78,23 +80,6 @@ def add(command: Command) -> None:
     """Add both commands."""
     run = command("run", _HELP_RUN, RUN, RUN_EXAMPLES)
     _add_daemon(run)
-    run.add_argument(
-        "--hil-viewer",
-        action="store_true",
-        help="send HEARTBEAT and HIL_STATE_QUATERNION (25 Hz, true state) to 127.0.0.1:19410+I for jMAVSim or Hawkeye",
-    )
-    run.add_argument(
-        "--forward", action="store_true", help="pass messages on between peers, as MAVLink's routing rules have it"
-    )
-    run.add_argument(
-        "--record",
-        type=Path,
-        nargs="?",
-        const=_IN_STATE,
-        metavar="DIR",
-        help="keep each flight in DIR (logs in the state folder): MAVLink frames as .tlog, control steps as .mcap",
-    )
-
     flock = command("swarm", _HELP_SWARM, SWARM, SWARM_EXAMPLES)
     flock.add_argument("count", type=reader(swarm.parse_count), metavar="N", help="how many vehicles, up to 250")
     _add_daemon(flock)
@@ -175,18 +160,29 @@ def _add_daemon(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="sign every message and take none that isn't signed with this key: 32 bytes, or 64 hexadecimal digits",
     )
+    parser.add_argument(
+        "--hil-viewer",
+        action="store_true",
+        help="send HEARTBEAT and HIL_STATE_QUATERNION (25 Hz, true state) to 127.0.0.1:19410+I for jMAVSim or Hawkeye",
+    )
+    parser.add_argument(
+        "--forward", action="store_true", help="pass messages on between peers, as MAVLink's routing rules have it"
+    )
+    parser.add_argument(
+        "--record",
+        type=Path,
+        nargs="?",
+        const=_IN_STATE,
+        metavar="DIR",
+        help="keep each flight in DIR (logs in the state folder; of a swarm a folder for each vehicle in it): "
+        "MAVLink frames as .tlog, control steps as .mcap",
+    )
     parser.add_argument("--verbose", action="store_true", help="log more")
 
 
 def run_setup(args: argparse.Namespace) -> config.Setup:
     """Of `sitl run`. Raises SettingError."""
-    settings = _common(args)._replace(
-        record=args.record is not None,
-        record_dir=None if args.record is _IN_STATE else args.record,
-        hil_viewer=args.hil_viewer,
-        forward=args.forward,
-    )
-    return config.Setup((settings,))
+    return config.Setup((_common(args),))
 
 
 def swarm_setup(args: argparse.Namespace) -> config.Setup:
@@ -218,4 +214,8 @@ def _common(args: argparse.Namespace) -> config.RunConfig:
         zenoh=not args.no_zenoh,
         listen=args.listen,
         signing_key=args.signing_key,
+        record=args.record is not None,
+        record_dir=None if args.record is _IN_STATE else args.record,
+        hil_viewer=args.hil_viewer,
+        forward=args.forward,
     )

@@ -51,7 +51,8 @@ def setup(
 ) -> Setup:
     """A vehicle like `first` at each place, north and east of its home [m]. Raises SettingError.
 
-    Instances and seeds count up from its own, and so do the folders in its state folder, if it has one.
+    Instances and seeds count up from its own, and so do the folders in its state folder and in that of its records, if
+    it has them.
     """
     last = first.instance + len(places_m) - 1
     if last > INSTANCE_MAX:
@@ -66,6 +67,7 @@ def setup(
                 place_N_m=place_m,
                 swarming=True,
                 state_dir=first.state_dir / f"instance-{instance}" if first.state_dir is not None else None,
+                record_dir=first.record_dir / f"instance-{instance}" if first.record_dir is not None else None,
                 settings=(("SIM_TLM_RATE", rate_max_Hz), *first.settings),
             )
         )

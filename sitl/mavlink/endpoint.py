@@ -185,14 +185,17 @@ class Endpoint:
             self._hear(peer, version)
         return peer
 
-    def take(self, frame: Frame, address: Address, kind: PortKind, wall_s: float) -> None:
-        """A frame that came to a port that this vehicle shares, paid for and found authentic there. Never raises."""
+    def take(self, frame: Frame, address: Address, kind: PortKind, wall_s: float, forwards: bool = True) -> None:
+        """A frame that came to a port that this vehicle shares, paid for and found authentic there. Never raises.
+
+        forwards: this vehicle is the one that passes it on to the others there.
+        """
         self._link.wall_s = wall_s
         if self._link.silent:
             return
         peer = self._link.peers.find(kind, address) or self._learn(address, kind)
         if peer is not None:
-            self._take(peer, frame)
+            self._take(peer, frame, forwards)
 
     def _learn(self, address: Address, kind: PortKind) -> "Peer | None":
         peer = self._link.peers.learn(kind, address, self._link.wall_s, self._vehicle.now_us)
@@ -205,13 +208,13 @@ class Endpoint:
             self._stream_due_us = 0
             self._greet(peer)
 
-    def _take(self, peer: Peer, frame: Frame) -> None:
+    def _take(self, peer: Peer, frame: Frame, to_shared: bool = True) -> None:
         link = self._link
         self._hear(peer, frame.version)
         if link.on_frame is not None and frame.id != _SETUP_SIGNING:
             link.on_frame(frame.raw, False)
         if self._router is not None:
-            self._router.take(peer, frame)
+            self._router.take(peer, frame, to_shared)
         try:
             self._dispatch(peer, frame)
         except Exception:

@@ -44,14 +44,18 @@ class Router:
         self._allowance = Allowance(link.limits.forwarded_Hz, link.limits.forwarded_burst)
         self._seen: dict[bytes, float] = {}
 
-    def take(self, origin: "Peer", frame: Frame) -> None:
-        """Note who is behind `origin`, and pass the frame on to whom it concerns."""
+    def take(self, origin: "Peer", frame: Frame, shared: bool = True) -> None:
+        """Note who is behind `origin`, and pass the frame on to whom it concerns; `shared`: at the shared port, too."""
         if len(origin.routes) < ROUTES_MAX:
             origin.routes.add((frame.system, frame.component))
         if frame.id in _NEVER or self._has_come_round(frame.raw):
             return
         for peer in self._recipients(frame):
-            if peer is origin or (peer.encoder.version == 1 and frame.version == 2):
+            if (
+                peer is origin
+                or (peer.kind is PortKind.SHARED and not shared)
+                or (peer.encoder.version == 1 and frame.version == 2)
+            ):
                 continue
             if not self._allowance.take(self._link.wall_s):
                 return

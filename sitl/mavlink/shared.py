@@ -3,7 +3,8 @@
 As a router between the ground stations and the vehicles would (mavlink.io/en/guide/routing.html): a message for one
 system goes to that vehicle alone, one without a target, or with target 0, to all of them. Whoever has been heard here
 is served by every vehicle, as if it had written to each. Frames are parsed and checked once, whatever their number of
-readers. What ground stations say to each other, or to a system that isn't here, ends here.
+readers. What ground stations say to each other, or to a system that isn't here, ends here; where messages are forwarded
+each vehicle passes them on at its own ports, and the first that gets one passes it on to the others here.
 """
 
 import logging
@@ -33,9 +34,11 @@ class _Sender:
 
 
 class SharedPort:
-    """`endpoints` by system id; they may come and go at any time. limits: of each sender."""
+    """`endpoints` by system id; they may come and go at any time. limits: of each sender. forward: as they do."""
 
-    def __init__(self, endpoints: Iterable[Endpoint], limits: Limits, signer: Signer | None = None) -> None:
+    def __init__(
+        self, endpoints: Iterable[Endpoint], limits: Limits, signer: Signer | None = None, *, forward: bool = False
+    ) -> None:
         self.endpoints = {endpoint.system_id: endpoint for endpoint in endpoints}
         self.faults = 0  # of vehicles in taking what was for them: mistakes in this program, logged
         self.refused = 0  # datagrams beyond their sender's allowance, or of one sender too many
@@ -43,6 +46,7 @@ class SharedPort:
         self.unauthentic = 0  # frames
         self._limits = limits
         self._signer = signer
+        self._forward = forward
         self._senders: dict[Address, _Sender] = {}
         self._strangers = Allowance(limits.strangers_Hz, limits.strangers_burst)
 
@@ -96,12 +100,12 @@ class SharedPort:
             self._give(known, lambda endpoint: endpoint.meet(address, PortKind.SHARED, frame.version, wall_s))
         place, _ = target_places(frame.id)
         system = frame.message[place] if place >= 0 else 0
-        if system:
-            readers = [self.endpoints[system]] if system in self.endpoints else []
-        else:
+        readers = [self.endpoints[system]] if system in self.endpoints else []
+        if not system or (self._forward and not readers):
             readers = list(self.endpoints.values())
             sender.allowance.charge(len(readers) - 1)  # it costs that many times as much
-        self._give(readers, lambda endpoint: endpoint.take(frame, address, PortKind.SHARED, wall_s))
+        first = readers[0] if readers else None
+        self._give(readers, lambda e: e.take(frame, address, PortKind.SHARED, wall_s, forwards=e is first))
 
     def _give(self, readers: Iterable[Endpoint], gift: Callable[[Endpoint], object]) -> None:
         """To each; one that fails at it takes nothing away from the others."""

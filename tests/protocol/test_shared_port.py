@@ -16,14 +16,14 @@ ARM = mav.MAV_CMD_COMPONENT_ARM_DISARM
 
 
 class Swarm:
-    def __init__(self, limits=UNLIMITED, signers=(None, None)) -> None:
+    def __init__(self, limits=UNLIMITED, signers=(None, None), forward=False) -> None:
         spec = load_vehicle("yawsitter")
         self.vehicles = [Vehicle(spec) for _ in SYSTEMS]
         self.endpoints = [
-            Endpoint(vehicle, system_id=system, signer=signers[0])
+            Endpoint(vehicle, system_id=system, signer=signers[0], forward=forward)
             for vehicle, system in zip(self.vehicles, SYSTEMS, strict=True)
         ]
-        self.port = SharedPort(self.endpoints, limits, signers[0])
+        self.port = SharedPort(self.endpoints, limits, signers[0], forward=forward)
         self.encoder = Encoder(255, 190, signers[1])
 
     def say(self, name, address=GCS, wall_s=0.0, **fields) -> bool:
@@ -152,3 +152,44 @@ def test_a_profile_slows_what_nobody_asked_for_and_leaves_unheard_peers_their_he
     hello = Encoder(255, 190).encode(message("HEARTBEAT", type=6, mavlink_version=3))
     endpoint.receive(hello, OTHER, PortKind.ONBOARD, vehicle.now_us * 1e-6)
     assert second().count((PortKind.ONBOARD, "ATTITUDE")) in (10, 11)
+
+
+class Party:
+    """Two ground stations at the shared port, and a camera at the second vehicle's own."""
+
+    camera = ("127.0.0.1", 50_001)
+
+    def __init__(self, forward: bool) -> None:
+        self.swarm = Swarm(forward=forward)
+        self._encoders = {GCS: Encoder(255, 190), OTHER: Encoder(254, 190), self.camera: Encoder(2, 100)}
+        for address in self._encoders:
+            self.heard_when_said("HEARTBEAT", address, type=6, mavlink_version=3)
+
+    def heard_when_said(self, name: str, address, **fields) -> list:
+        """Who hears it then, each as often as it does."""
+        frame = self._encoders[address].encode(message(name, **fields))
+        if address is self.camera:
+            self.swarm.endpoints[1].receive(frame, address, PortKind.ONBOARD, 0.0)
+        else:
+            self.swarm.port.receive(frame, address, 0.0)
+        sent = [datagram for endpoint in self.swarm.endpoints for datagram in endpoint.poll(0.0)]
+        return sorted(datagram.address for datagram in sent if datagram.data == frame)
+
+
+def test_what_is_forwarded_reaches_everybody_whom_it_concerns_once() -> None:
+    party = Party(forward=True)
+    camera = party.camera
+    assert party.heard_when_said("HEARTBEAT", GCS, type=6) == [OTHER, camera]
+    assert party.heard_when_said("STATUSTEXT", camera, text=b"smile") == [GCS, OTHER]
+    assert party.heard_when_said("COMMAND_LONG", GCS, target_system=2, target_component=100, command=203) == [camera]
+    assert party.heard_when_said("COMMAND_ACK", camera, command=203, target_system=255, target_component=190) == [GCS]
+    assert party.heard_when_said("COMMAND_LONG", GCS, target_system=254, target_component=190, command=1) == [OTHER]
+    assert party.heard_when_said("COMMAND_LONG", GCS, target_system=3, target_component=1, command=ARM) == []
+    assert party.heard_when_said("COMMAND_LONG", GCS, target_system=77, target_component=1, command=ARM) == []
+
+
+def test_nothing_is_forwarded_unless_asked_for() -> None:
+    party = Party(forward=False)
+    assert party.heard_when_said("HEARTBEAT", GCS, type=6) == []
+    assert party.heard_when_said("STATUSTEXT", party.camera, text=b"smile") == []
+    assert party.heard_when_said("COMMAND_LONG", GCS, target_system=254, target_component=190, command=1) == []

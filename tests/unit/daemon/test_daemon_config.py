@@ -88,8 +88,8 @@ def test_more_ground_stations_join_the_usual_one_without_doubling_it() -> None:
 def test_a_far_ground_station_needs_a_wider_ear() -> None:
     far = RunConfig(ground_stations=(("192.0.2.7", 14550),))
     with pytest.raises(SettingError, match=r"--listen 0\.0\.0\.0"):
-        config.check(far)
-    assert config.check(far._replace(listen="0.0.0.0")).listen == "0.0.0.0"
+        config.check(config.Setup((far,)))
+    assert config.check(config.Setup((far._replace(listen="0.0.0.0"),))).first.listen == "0.0.0.0"
 
 
 def test_state_lives_in_the_user_s_state_folder(monkeypatch, tmp_path) -> None:

@@ -20,9 +20,10 @@ from pymavlink import mavutil
 from sitl.closed_loop import TRACE_COLUMNS, traced
 from sitl.daemon import flight_writer
 from sitl.daemon.config import SettingError
+from sitl.daemon.flight_pipe import BACKLOG_MAX, BEGIN, FRAME, HEAD, STEPS, FlightPipe
 from sitl.daemon.flight_recorder import FlightRecorder
 from sitl.daemon.flight_writer import FlightFiles, json_schema, make_room, write
-from sitl.daemon.recorder import BACKLOG_MAX, BEFORE_BYTES, BEGIN, FRAME, HEAD, STEPS, Flight, Recorder
+from sitl.daemon.recorder import BEFORE_BYTES, Flight, Recorder, close
 from sitl.mavlink.codec import Encoder, message
 from sitl.mavlink.tlog import STAMP
 from sitl.telemetry import schema
@@ -30,7 +31,7 @@ from sitl.telemetry.feed import Feed
 from sitl.vehicle import Vehicle, load_vehicle
 
 HEARTBEAT = Encoder(1, 1).encode(message("HEARTBEAT", type=19, autopilot=12, mavlink_version=3))
-FLIGHT = Flight("2026-01-02_03-04-05-678Z_instance-3", 3, 1_700_000_000.0, 1_000_000, (55.0, 37.0, 190.0))
+FLIGHT = Flight("2026-01-02_03-04-05-678Z_instance-3", 3, 1_700_000_000.0, 1_000_000, (55.0, 37.0, 190.0), "")
 
 
 @pytest.fixture(scope="module")
@@ -41,9 +42,9 @@ def vehicle() -> Vehicle:
 
 @pytest.fixture
 def recorder(tmp_path):
-    made = Recorder(tmp_path, 3)
+    made = Recorder(FlightPipe(), tmp_path, 3)
     yield made
-    made.close()
+    close([made])
 
 
 def fly(vehicle: Vehicle, recorder: Recorder, seconds: float, unix_s: float = 1000.0) -> list[list[float]]:
@@ -84,7 +85,7 @@ def frames(path: Path) -> list:
 
 def test_a_flight_is_kept_whole_at_the_rate_of_the_control_steps(vehicle, recorder, tmp_path) -> None:
     rows = fly(vehicle, recorder, 1.0)
-    recorder.close()
+    close([recorder])
     assert (recorder.steps_kept, recorder.steps_seen) == (500, 500)
     [mcap], [tlog] = tmp_path.glob("*.mcap"), tmp_path.glob("*.tlog")
     kept = contents(mcap)
@@ -115,9 +116,9 @@ def test_each_flight_gets_files_of_its_own_and_the_time_between_gets_none(vehicl
     for _ in range(3):
         recorder.frame(HEARTBEAT, 2000.0)
     fly(vehicle, recorder, 0.2, unix_s=3000.0)
-    [_, last] = sorted(recorder._closing) if len(recorder._closing) == 2 else ["", *recorder._closing]
+    [_, last] = sorted(recorder.pipe.closing) if len(recorder.pipe.closing) == 2 else ["", *recorder.pipe.closing]
     assert recorder.writes(f"{last}.mcap")  # it may not be removed before it is whole
-    recorder.close()
+    close([recorder])
     assert not recorder.writes(f"{last}.mcap")
     sizes = [len(contents(path)["yawsitter/3/state"]) for path in sorted(tmp_path.glob("*.mcap"))]
     assert sizes == [50, 100]
@@ -127,7 +128,7 @@ def test_of_the_time_before_a_flight_the_last_frames_are_kept_and_no_more(record
     for k in range(2 * BEFORE_BYTES // len(HEARTBEAT)):
         recorder.frame(HEARTBEAT, 1000.0 + k)
     recorder.begin(1e6, 0, (55.0, 37.0, 190.0))
-    recorder.close()
+    close([recorder])
     [tlog] = tmp_path.glob("*.tlog")
     stamped = STAMP.size + len(HEARTBEAT)
     assert BEFORE_BYTES - stamped < tlog.stat().st_size <= BEFORE_BYTES
@@ -136,7 +137,7 @@ def test_of_the_time_before_a_flight_the_last_frames_are_kept_and_no_more(record
 
 
 def test_the_log_time_is_the_wall_time_at_arming_plus_simulation_time(tmp_path) -> None:
-    files = FlightFiles(tmp_path, FLIGHT)
+    files = FlightFiles(FLIGHT._replace(folder=str(tmp_path)))
     files.steps(row_at(1.5).tobytes())
     files.close()
     with next(tmp_path.glob("*.mcap")).open("rb") as file:
@@ -152,7 +153,7 @@ def row_at(t_s: float) -> np.ndarray:
 
 
 def test_when_the_writer_dies_all_up_to_the_last_flush_can_be_read(tmp_path) -> None:
-    files = FlightFiles(tmp_path, FLIGHT)
+    files = FlightFiles(FLIGHT._replace(folder=str(tmp_path)))
     for k in range(1000):
         files.frame(STAMP.pack(1_700_000_000_000_000 + k) + HEARTBEAT)
         files.steps(row_at(1.0 + 0.002 * k).tobytes())
@@ -172,10 +173,14 @@ def test_when_the_writer_dies_all_up_to_the_last_flush_can_be_read(tmp_path) -> 
 
 
 def test_when_the_vehicles_process_dies_the_files_are_closed_properly(tmp_path) -> None:
-    sent = [(BEGIN, FLIGHT.pack()), (FRAME, STAMP.pack(5) + HEARTBEAT), (STEPS, row_at(1.0).tobytes())]
-    stream = b"".join(HEAD.pack(kind, len(data)) + data for kind, data in sent)
+    sent = [
+        (BEGIN, FLIGHT._replace(folder=str(tmp_path)).pack()),
+        (FRAME, STAMP.pack(5) + HEARTBEAT),
+        (STEPS, row_at(1.0).tobytes()),
+    ]
+    stream = b"".join(HEAD.pack(kind, 3, len(data)) + data for kind, data in sent)
     done: list[str] = []
-    write(tmp_path, io.BytesIO(stream + HEAD.pack(STEPS, 824) + b"half a st"), done.append)
+    write(io.BytesIO(stream + HEAD.pack(STEPS, 3, 824) + b"half a st"), done.append)
     assert done == [FLIGHT.name]
     assert len(contents(tmp_path / f"{FLIGHT.name}.mcap")["yawsitter/3/state"]) == 1
     assert len(frames(tmp_path / f"{FLIGHT.name}.tlog")) == 1
@@ -183,7 +188,7 @@ def test_when_the_vehicles_process_dies_the_files_are_closed_properly(tmp_path) 
 
 def test_nobody_waits_for_a_writer_that_stands_still_and_steps_are_thinned_not_torn(recorder, tmp_path) -> None:
     recorder.begin(1.7e9, 0, (55.0, 37.0, 190.0))
-    os.kill(recorder._process.pid, signal.SIGSTOP)
+    os.kill(recorder.pipe.process.pid, signal.SIGSTOP)
     try:
         rows = np.concatenate([row_at(0.002 * k) for k in range(200)])
         longest = 0.0
@@ -194,10 +199,10 @@ def test_nobody_waits_for_a_writer_that_stands_still_and_steps_are_thinned_not_t
             recorder.pump()
             longest = max(longest, time.perf_counter() - start_s)
         assert longest < 5.0  # it would be for ever; anything in between is the machine
-        assert len(recorder._backlog) <= BACKLOG_MAX
+        assert len(recorder.pipe.backlog) <= BACKLOG_MAX
     finally:
-        os.kill(recorder._process.pid, signal.SIGCONT)
-    recorder.close()
+        os.kill(recorder.pipe.process.pid, signal.SIGCONT)
+    close([recorder])
     assert recorder.steps_seen == 80_000
     assert 2000 < recorder.steps_kept < 40_000
     state = contents(next(tmp_path.glob("*.mcap")))["yawsitter/3/state"]
@@ -209,8 +214,8 @@ def test_nobody_waits_for_a_writer_that_stands_still_and_steps_are_thinned_not_t
 
 def test_when_the_writer_is_gone_the_recording_ends_and_nothing_else(vehicle, recorder, caplog) -> None:
     caplog.set_level(logging.ERROR)
-    recorder._process.kill()
-    recorder._process.wait()
+    recorder.pipe.process.kill()
+    recorder.pipe.process.wait()
     fly(vehicle, recorder, 0.2)
     assert caplog.text.count("recording stopped") == 1
 
@@ -234,7 +239,7 @@ def test_the_oldest_flights_make_room_and_other_files_stay(tmp_path, monkeypatch
 def test_a_flight_that_outgrows_its_file_loses_its_end_not_its_begin(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(flight_writer, "FLIGHT_BYTES", 20_000)
     monkeypatch.setattr(flight_writer, "CHUNK_BYTES", 4096)
-    files = FlightFiles(tmp_path, FLIGHT)
+    files = FlightFiles(FLIGHT._replace(folder=str(tmp_path)))
     for k in range(3000):
         files.steps(row_at(1.0 + 0.002 * k).tobytes())
     files.close()
@@ -253,4 +258,4 @@ def test_schemas_are_plain_objects(message) -> None:
 def test_a_folder_that_can_t_be_made_is_refused_in_one_line(tmp_path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(SettingError, match="--record"):
-        Recorder(tmp_path / "file", 0)
+        Recorder(None, tmp_path / "file", 0)

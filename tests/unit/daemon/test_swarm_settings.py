@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from sitl.daemon import formation, swarm
+from sitl.daemon import config, formation, swarm
 from sitl.daemon.config import Port, RunConfig, SettingError
 from sitl.strict_yaml import ConfigError
 
@@ -36,6 +36,22 @@ def test_no_two_swarms_and_vehicles_get_the_same_ports() -> None:
     setups = [swarm.setup(RunConfig(instance=first), swarm.grid(1, 1.0), 10.0) for first in range(250)]
     ports = [port for made in setups for _, port in made.sockets.values()]
     assert len(set(ports)) == len(ports)
+
+
+def test_what_is_recorded_lies_in_a_folder_for_each_vehicle() -> None:
+    first = RunConfig(record=True, record_dir=Path("logs"), state_dir=Path("s"))
+    made = swarm.setup(first, swarm.grid(2, 3.0), 10.0)
+    assert [v.log_dir for v in made.vehicles] == [Path("logs/instance-0"), Path("logs/instance-1")]
+    made = swarm.setup(first._replace(record_dir=None), swarm.grid(2, 3.0), 10.0)
+    assert [v.log_dir for v in made.vehicles] == [Path("s/instance-0/logs"), Path("s/instance-1/logs")]
+
+
+def test_a_viewer_whose_port_would_be_another_vehicles_is_refused() -> None:
+    config.check(swarm.setup(RunConfig(hil_viewer=True), swarm.grid(40, 3.0), 10.0))
+    with pytest.raises(SettingError, match="instance 40 would send to UDP 19450, where instance 0 listens"):
+        config.check(swarm.setup(RunConfig(hil_viewer=True), swarm.grid(41, 3.0), 10.0))
+    with pytest.raises(SettingError, match="--hil-viewer"):
+        config.check(config.Setup((RunConfig(instance=50, hil_viewer=True),)))
 
 
 def test_more_vehicles_than_system_ids_are_refused() -> None:
