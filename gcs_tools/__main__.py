@@ -244,7 +244,7 @@ def parser() -> argparse.ArgumentParser:
     add(commands, "hold", "stop and hover here", "  gcs hold")
     mode = add(commands, "mode", "switch to a mode", "  gcs mode mission")
     mode.add_argument("mode", choices=MODES)
-    watch = add(commands, "watch", "show the vehicle's state live, until Ctrl-C", "  gcs watch\n  gcs watch --for 10")
+    watch = add(commands, "watch", "show vehicles live: a dashboard on a terminal, lines elsewhere", _WATCHES)
     watch.add_argument("--for", dest="seconds", type=_positive, metavar="S", help="stop after so long")
 
     view = commands.add_parser(
@@ -288,6 +288,10 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
+_WATCHES = (
+    "  gcs watch\n  gcs watch --system 3 --connect udpout:127.0.0.1:18300     a swarm, this one of it in full\n"
+    "  gcs watch --for 10 | tee flight.txt\n\nkeys: q quits, space pauses drawing, arrows and 1 to 9 choose a vehicle"
+)
 _WAIT_DOWN = "until it stands disarmed"
 _LOADS = "  gcs param load mine.yaml\n  gcs param load sitl/gains/tuned.yaml\n  gcs param load qgroundcontrol.params"
 _Raw = argparse.RawDescriptionHelpFormatter

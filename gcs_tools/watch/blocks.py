@@ -122,25 +122,24 @@ def _estimator(seen: Seen) -> Text:
     return text
 
 
-def link(seen: Seen, wall_s: float, width: int, rows: int) -> list[Text]:
-    """What the link carries: a line for all of it, then one a message."""
-    flows = seen.traffic.flows(wall_s)
-    every = total(flows)
+def link(seen: Seen, wall_s: float) -> Text:
+    """What the link carries, all messages together, and how well."""
+    every = total(seen.traffic.flows(wall_s))
     loss, trip_s = seen.traffic.loss(wall_s), seen.instruments.round_trip_s
-    text = label("link", _LABEL).append(f"{every.frames_Hz:.0f}/s ", NUMBER)
-    text.append(f"{every.bytes_Hz / 1000.0:.1f} kB/s  ", NUMBER)
-    lines = [text]
-    if width < 60:
-        text = label("", _LABEL)
-        lines.append(text)
+    text = Text().append(f"{every.frames_Hz:.0f}/s {every.bytes_Hz / 1000.0:.1f} kB/s", NUMBER)
     if loss is not None:
         style = BAD if loss > 0.05 else WARN if loss > 0.005 else GOOD
-        text.append("lost ", DIM).append(f"{100.0 * loss:.1f} %", style)
+        text.append("  lost ", DIM).append(f"{100.0 * loss:.1f} %", style)
     if trip_s is not None:
-        text.append("  round trip ", DIM).append(f"{1000.0 * trip_s:.1f} ms")
-    for flow in flows[:rows]:
-        line = label(f"  {flow.name}", 0)
-        lines.append(beside(line, Text(f"{flow.frames_Hz:6.1f}/s {flow.bytes_Hz:6.0f} B/s"), width))
+        text.append("  trip ", DIM).append(f"{1000.0 * trip_s:.1f} ms")
+    return text
+
+
+def flows(seen: Seen, wall_s: float, width: int, rows: int) -> list[Text]:
+    """The messages that take most of the link, one a line below a head."""
+    lines = [beside(label("message", 0), label("/s    B/s", 0), width)]
+    for flow in seen.traffic.flows(wall_s)[:rows]:
+        lines.append(beside(label(flow.name, 0), Text(f"{flow.frames_Hz:5.1f}{flow.bytes_Hz:7.0f}"), width))
     return lines
 
 

@@ -6,12 +6,13 @@ from rich.text import Text
 
 from gcs_tools.watch import blocks, motion, track_map
 from gcs_tools.watch.gauges import compass, duration, fixed, printable
-from gcs_tools.watch.lines import BAD, DIM, GOOD, WARN, beside, join, rule
+from gcs_tools.watch.lines import BAD, DIM, GOOD, WARN, beside, join, label, rule
 from gcs_tools.watch.motion import PLACE_WIDTH
 from gcs_tools.watch.seen import Seen
 
 WIDE = 116  # columns from which a map and the link stand beside
 GAP = 2
+TALL = 33  # lines below the head, from which there is place for the link's messages
 ROOMY = 18  # lines below the head, fewer of which leave no place for a rule
 CURVE_MAX = 8  # lines of a curve
 NEWS_ROWS = 6
@@ -78,7 +79,7 @@ def _footer(scene: Scene, width: int) -> Text:
 def _body(seen: Seen, wall_s: float, width: int, room: int) -> list[Text]:
     if width < WIDE:
         return _main(seen, wall_s, width, room)
-    side = min(80, max(38, width * 9 // 25))
+    side = min(80, width * 2 // 5 - 10)
     main = _main(seen, wall_s, width - side - GAP, room, link_beside=True)
     return join(main, _side(seen, wall_s, side, room), width - side, GAP)
 
@@ -88,7 +89,9 @@ def _main(seen: Seen, wall_s: float, width: int, room: int, link_beside: bool = 
     made = join(motion.place(seen), motion.actuators(seen, width - PLACE_WIDTH - GAP), PLACE_WIDTH + GAP, GAP)
     status = [blocks.status(seen, width)]
     if not link_beside:
-        status += blocks.link(seen, wall_s, width, 0 if room < 34 else 4)
+        status.append(label("link", 9).append_text(blocks.link(seen, wall_s)))
+        if room > TALL:
+            status += blocks.flows(seen, wall_s, width, 4)
     if room >= ROOMY:
         status.insert(0, rule("status", width))
     tall = max(1, min(CURVE_MAX, (room - len(made) - 1 - len(status) - NEWS_ROWS) // 4))
@@ -107,7 +110,8 @@ def _side(seen: Seen, wall_s: float, width: int, room: int) -> list[Text]:
     return [
         *_map(seen, width, high),
         rule("link", width),
-        *blocks.link(seen, wall_s, width, rows),
+        blocks.link(seen, wall_s),
+        *blocks.flows(seen, wall_s, width, rows),
     ]
 
 

@@ -17,7 +17,7 @@ LABEL = 10
 PLACE_WIDTH = 47
 THRUST_N, FLAP_DEG = 5.0, 5.0  # of a gauge, at least
 LEAN_DEG = 45.0
-_BEGIN, _END = 8, 19  # cells of a curve's line before and behind it
+_BEGIN, _END = 7, 18  # cells of a curve's line before and behind it
 
 _Picture = Callable[[float, int], str]  # share, width
 
@@ -126,7 +126,7 @@ def _drawn(curve: _Curve, trace: Trace, count: int, wall_s: float, height: int) 
         line = label(curve.name if k == 0 else "", _BEGIN).append(cells, curve.style)
         value = f"{fixed(trace.value, digits)} {curve.unit}" if k == 0 and now and trace.value is not None else ""
         limit = f"≤ {fixed(high, digits)}" if k == 0 else f"≥ {fixed(low, digits)}" if k == height - 1 else ""
-        lines.append(line.append(f" {value:>9}", NUMBER).append(f" {limit if known else '':<8}", DIM))
+        lines.append(line.append(f" {value:>9}", NUMBER).append(f" {limit if known else '':<7}", DIM))
     return lines
 
 

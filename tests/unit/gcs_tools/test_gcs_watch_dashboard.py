@@ -1,5 +1,7 @@
 """What the dashboard of `gcs watch` shows, from a vehicle's bytes to lines of text."""
 
+import re
+
 import pytest
 from gcs_tools_stand_in import StandIn
 from watched import Air, row
@@ -58,7 +60,7 @@ def test_a_wide_screen_has_a_map_and_every_message_of_the_link() -> None:
     screen = air.screen(140, 40)
     assert "map · north up" in screen
     assert "⌂" in screen
-    assert row(screen, "POSITION_TARGET_LOCAL_NED").endswith("B/s")
+    assert re.search(r"POSITION_TARGET_LOCAL_NED +1\d\.\d +2\d\d$", screen, re.MULTILINE)
     assert "map" not in air.screen(80, 24)
 
 
@@ -137,7 +139,7 @@ def test_a_vehicle_that_started_again_has_lost_nothing_by_counting_anew() -> Non
 def test_the_round_trip_is_told() -> None:
     air = Air(StandIn()).fly(3.0)
     assert air.seen.instruments.round_trip_s == pytest.approx(0.0, abs=1e-6)
-    assert "round trip 0.0 ms" in air.screen()
+    assert "trip 0.0 ms" in air.screen()
 
 
 def test_flight_time_counts_the_vehicles_seconds_from_arming_to_disarming() -> None:
