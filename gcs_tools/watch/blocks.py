@@ -26,9 +26,9 @@ def header(seen: Seen, wall_s: float, width: int, frozen: bool) -> list[Text]:
     left = Text(" ").append(printable(v.name or "unnamed vehicle"), "bold").append(f" · system {seen.system}   ", DIM)
     left.append(f" {(v.mode or '?').upper()} ", "bold reverse cyan" if not lost else "reverse").append(" ")
     left.append(" ARMED " if v.armed else " disarmed ", "bold reverse yellow" if v.armed else DIM).append("  ")
-    left.append(_LANDED[v.landed] if v.landed < len(_LANDED) else "")
     if v.status in _STATES:
-        left.append("  ").append(f" {_STATES[v.status]} ", "bold reverse red")
+        left.append(f" {_STATES[v.status]} ", "bold reverse red").append("  ")
+    left.append(_LANDED[v.landed] if v.landed < len(_LANDED) else "")
     right = Text()
     if frozen:
         right.append(" DRAWING PAUSED ", "reverse").append(" ")
@@ -48,8 +48,8 @@ def _heartbeat_age_s(seen: Seen, wall_s: float) -> float:
 def _second(seen: Seen, wall_s: float, width: int) -> Text:
     v, i = seen.vehicle, seen.instruments
     text = Text()
-    if v.ready is not None:
-        text.append(" ready " if v.ready or v.armed else " not ready ", GOOD if v.ready or v.armed else WARN)
+    if v.ready is not None and not v.armed:
+        text.append(" ready " if v.ready else " not ready ", GOOD if v.ready else WARN)
     if i.flight_s is not None:
         text.append(" flight ", DIM).append(f"{'≥ ' if i.joined_in_flight else ''}{gauges.duration(i.flight_s)} ")
     if v.battery >= 0:

@@ -51,7 +51,9 @@ def nice(x: float) -> float:
 
 
 def fixed(x: float, digits: int, signed: bool = False) -> str:
-    """A number with so many digits behind the point; what rounds to nothing has no sign."""
+    """A number with so many digits behind the point; what rounds to nothing has no sign, what is huge an exponent."""
+    if abs(x) >= 1e6:
+        return f"{x:.1e}"
     return f"{round(x, digits) + 0.0:{'+' if signed else ''}.{digits}f}"
 
 

@@ -143,7 +143,8 @@ class Instruments:
         self.speed.put(math.hypot(m.vx, m.vy, m.vz), wall_s)
         if wall_s - self._track_s >= _TRACK_S:
             self._track_s = wall_s
-            self.track.append((m.x, m.y))
+            if math.isfinite(m.x + m.y):
+                self.track.append((m.x, m.y))
         self.error_m = _error(m, self._target) if self._client.vehicle.armed else None
         if self.error_m is not None:
             self.error.put(math.hypot(*self.error_m), wall_s)
@@ -152,6 +153,9 @@ class Instruments:
         self._target = m
 
     def _attitude(self, m: Any) -> None:
+        if not math.isfinite(m.roll + m.pitch + m.yaw):
+            self.heading_deg = self.tilt_deg = None
+            return
         self.heading_deg = math.degrees(m.yaw) % 360.0
         self.tilt_deg = math.degrees(math.acos(max(-1.0, min(1.0, math.cos(m.roll) * math.cos(m.pitch)))))
 

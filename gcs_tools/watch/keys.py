@@ -1,5 +1,6 @@
 """Keys as they are pressed, where standard input is a terminal; elsewhere none are."""
 
+import contextlib
 import os
 import select
 import sys
@@ -51,7 +52,8 @@ class Keys:
         if self._before is not None:
             import termios
 
-            termios.tcsetattr(self._stdin, termios.TCSADRAIN, self._before)
+            with contextlib.suppress(termios.error):  # the terminal may have gone
+                termios.tcsetattr(self._stdin, termios.TCSADRAIN, self._before)
             self._before = None
 
     def read(self) -> list[str]:

@@ -2,7 +2,7 @@
 
 from rich.text import Text
 
-DIM, TITLE, NUMBER, GOOD, WARN, BAD = "bright_black", "bold cyan", "bold", "green", "yellow", "bold red"
+DIM, TITLE, NUMBER, GOOD, WARN, BAD = "dim", "bold cyan", "bold", "green", "yellow", "bold red"
 
 
 def label(text: str, width: int) -> Text:

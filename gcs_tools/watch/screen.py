@@ -1,5 +1,6 @@
 """The terminal that is drawn on: lines are put in place, and only what has changed of them is written."""
 
+import contextlib
 import os
 import signal
 import sys
@@ -33,7 +34,6 @@ class Screen:
         self._shown: list[list[Segment]] = []
         self._size = (0, 0)
         self._handlers: dict[int, Any] = {}
-        self.written = 0  # bytes
 
     def __enter__(self) -> "Screen":
         for name in _ENDING:
@@ -46,7 +46,8 @@ class Screen:
     def __exit__(self, *_: object) -> None:
         for number, handler in self._handlers.items():
             signal.signal(number, handler)
-        self._write(_LEAVE)
+        with contextlib.suppress(OSError):  # the terminal may have gone
+            self._write(_LEAVE)
 
     @property
     def size(self) -> tuple[int, int]:
@@ -60,10 +61,6 @@ class Screen:
     def is_resized(self) -> bool:
         """Since it was drawn on."""
         return self.size != self._size
-
-    def clear(self) -> None:
-        """Draw everything anew the next time."""
-        self._size = (0, 0)
 
     def draw(self, lines: Sequence[Text]) -> None:
         """The whole picture, from the top line down."""
@@ -101,7 +98,6 @@ class Screen:
         if not text:
             return
         data = text.encode(sys.stdout.encoding or "utf-8", errors="replace")
-        self.written += len(data)
         sys.stdout.flush()
         while data:
             data = data[os.write(sys.stdout.fileno(), data) :]

@@ -14,7 +14,7 @@ REASON_S = 5.0  # between two questions why it isn't ready
 AGAIN_S = 5.0  # after which streams that couldn't be had are asked for again
 
 # Intervals of the chosen vehicle's streams, and of all others' [µs of vehicle time at real time]; the rest is off
-_CHOSEN = {
+CHOSEN = {
     "LOCAL_POSITION_NED": 100_000,
     "POSITION_TARGET_LOCAL_NED": 100_000,
     "DEBUG_VECT": 100_000,
@@ -26,7 +26,7 @@ _CHOSEN = {
     "WIND_COV": 500_000,
     "ESTIMATOR_STATUS": 1_000_000,
 }
-_OTHERS = {
+OTHERS = {
     "LOCAL_POSITION_NED": 500_000,
     "POSITION_TARGET_LOCAL_NED": 500_000,
     "SYS_STATUS": 1_000_000,
@@ -78,7 +78,7 @@ class Seen:
                 yield from client.set_intervals(self._wanted())
                 self.trouble = ""
                 yield from client.pause(TURN_S)
-                for name in set(_CHOSEN) - self.traffic.names:
+                for name in set(CHOSEN) - self.traffic.names:
                     client.request(name)  # of a vehicle whose clock stands still nothing flows
                 while asked == self._asked():
                     self._ping()
@@ -103,7 +103,7 @@ class Seen:
             self.trouble = ""  # lost, which shows by itself
 
     def _wanted(self) -> dict[str, int]:
-        wanted = _CHOSEN if self.chosen else _OTHERS
+        wanted = CHOSEN if self.chosen else OTHERS
         return dict.fromkeys(UNWANTED, -1) | {name: round(us * self._scale) for name, us in wanted.items()}
 
     def _asked(self) -> tuple[bool, float, int]:

@@ -1,5 +1,6 @@
 """A map with north up, in Braille dots: where the vehicle has been, where it is, and where it should be."""
 
+import math
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from typing import NamedTuple
@@ -20,6 +21,7 @@ class Drawn(NamedTuple):
 
 def draw(track: Sequence[Place], marks: Sequence[tuple[str, Place]], width: int, height: int) -> Drawn:
     """The track and marks, as large as they fit into width × height cells; metres are alike in both directions."""
+    marks = [(mark, place) for mark, place in marks if math.isfinite(place[0] + place[1])]
     everything = [*track, *(place for _, place in marks)] or [(0.0, 0.0)]
     norths, easts = [p[0] for p in everything], [p[1] for p in everything]
     centre_n, centre_e = 0.5 * (min(norths) + max(norths)), 0.5 * (min(easts) + max(easts))

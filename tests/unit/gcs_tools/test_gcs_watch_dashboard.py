@@ -1,12 +1,15 @@
 """What the dashboard of `gcs watch` shows, from a vehicle's bytes to lines of text."""
 
+import math
 import re
 
 import pytest
 from gcs_tools_stand_in import StandIn
 from watched import Air, row
 
-from gcs_tools.watch.seen import _CHOSEN
+from gcs_tools.client import Client
+from gcs_tools.watch.seen import CHOSEN
+from gcs_tools.watch.station import Station
 from sitl.mavlink import codec
 from sitl.mavlink.codec import mav
 
@@ -99,7 +102,7 @@ def test_a_lost_vehicle_says_since_when_and_is_asked_anew_when_it_is_back() -> N
     screen = air.fly(3.0).screen()
     assert "LOST" not in screen
     assert "heard again after 6 s" in screen
-    assert vehicle.intervals["LOCAL_POSITION_NED"] == _CHOSEN["LOCAL_POSITION_NED"]
+    assert vehicle.intervals["LOCAL_POSITION_NED"] == CHOSEN["LOCAL_POSITION_NED"]
 
 
 def test_streams_that_nobody_looks_at_are_off_and_back_at_the_vehicles_own_rates_afterwards() -> None:
@@ -268,3 +271,30 @@ def test_a_vehicle_whose_clock_stands_still_is_shown_as_it_stands() -> None:
     screen = Air(vehicle).fly(4.0).screen()
     assert row(screen, "position").startswith("position 4.000")
     assert "stands still" in screen
+
+
+def test_it_ends_after_the_time_asked_for() -> None:
+    air = Air(flying())
+    air.station = Station(Client, seconds=3.0)
+    assert not air.fly(2.9).station.finished
+    assert air.fly(0.2).station.finished
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, 3e38])
+def test_numbers_that_are_none_are_shown_as_they_come(value: float) -> None:
+    air = Air(flying()).fly(1.0)
+    vehicle = air.vehicles[0]
+    vehicle.intervals = {}
+    xyz = {"x": value, "y": value, "z": value}
+    speeds = {"vx": value, "vy": value, "vz": value}
+    for _ in range(2):
+        vehicle.send("POSITION_TARGET_LOCAL_NED", time_boot_ms=1000, **xyz, **speeds)
+        vehicle.send("LOCAL_POSITION_NED", time_boot_ms=1000, **xyz, **speeds)
+        vehicle.send("ATTITUDE", roll=value, pitch=value, yaw=value)
+        for name in ("YXZ_DEG", "THRUST_N", "FLAP_DEG"):
+            vehicle.send("DEBUG_VECT", name=name, **xyz)
+        vehicle.send("WIND_COV", wind_x=value, wind_y=value, wind_z=value)
+        vehicle.send("ESTIMATOR_STATUS", pos_horiz_accuracy=value, pos_vert_accuracy=value)
+        air.fly(1.0)
+        for size in ((80, 24), (140, 40)):
+            air.screen(*size)

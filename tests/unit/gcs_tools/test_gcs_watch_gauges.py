@@ -79,3 +79,4 @@ def test_keys_are_read_however_the_terminal_sends_them() -> None:
 def test_what_rounds_to_nothing_has_no_sign() -> None:
     assert [gauges.fixed(x, 2) for x in (-0.001, 0.0, -0.006, 1.5)] == ["0.00", "0.00", "-0.01", "1.50"]
     assert gauges.fixed(2.0, 1, signed=True) == "+2.0"
+    assert gauges.fixed(-3.4e38, 2) == "-3.4e+38"
