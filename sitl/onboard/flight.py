@@ -90,10 +90,15 @@ class Flight:
 
     def face(self, mode: Mode, fix: Fix) -> None:
         """Turn to what is to be faced, once the mode has had its say."""
-        if mode in FACING and not self.guide.standing:
+        if self._faces(mode):
             bearing = self.gaze.bearing(self.guide.reference(fix))
             if bearing is not None or self.guide.faced:
                 self.guide.face(fix, bearing)
+
+    def _faces(self, mode: Mode) -> bool:
+        """Whether the heading is not the trajectory's own, or may cease to be."""
+        turned = self.guide.faced or self.gaze.look is not Look.AHEAD
+        return turned and mode in FACING and not self.guide.standing
 
     def landing(self, mode: Mode) -> bool:
         """Whether the mode is bringing the vehicle down."""
@@ -136,8 +141,7 @@ class Flight:
 
     def waits(self, mode: Mode, fix: Fix) -> Wait | None:
         """What the mode waits for with the trajectory in force; None: it may put another in force at any tick."""
-        faces = mode in FACING and not self.guide.standing
-        if faces and (self.guide.faced or self.gaze.look is not Look.AHEAD):
+        if self._faces(mode):
             return None
         waits = self._WAITS.get(mode)
         return waits(self, fix) if waits is not None else None
