@@ -72,13 +72,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _airspeed(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = -1.0
-    if not 0.0 <= value <= 50.0:
-        raise config.SettingError(f"'{text}' is not a speed from 0 to 50 m/s")
-    return value
+    return config.parse_number(text, 0.0, 50.0, "m/s")
 
 
 def _parser() -> argparse.ArgumentParser:

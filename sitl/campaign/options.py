@@ -3,7 +3,8 @@
 import argparse
 from pathlib import Path
 
-from sitl.options import Command
+from sitl.daemon.config import parse_number
+from sitl.options import Command, reader
 
 CAMPAIGN = """\
 Fly a mission many times: Monte Carlo, grids, Latin hypercubes and Sobol sequences over wind, seeds, parameters, the
@@ -61,13 +62,7 @@ def _whole(text: str) -> int:
 
 
 def _rate(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 1.0 <= value <= 500.0:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a rate from 1 to 500 Hz")
-    return value
+    return parse_number(text, 1.0, 500.0, "Hz")
 
 
 def _add_workers(parser: argparse.ArgumentParser) -> None:
@@ -91,7 +86,7 @@ def add(command: Command) -> None:
     dataset.add_argument("--episodes", type=_whole, metavar="N", help="without a file: how many (100)")
     dataset.add_argument("--mission", metavar="MISSION", help="without a file: a mission's file (random flights)")
     dataset.add_argument("--vehicle", metavar="NAME|FILE", help="without a file: which vehicle (yawsitter-real)")
-    dataset.add_argument("--rate", type=_rate, metavar="HZ", help="without a file: samples a second (50)")
+    dataset.add_argument("--rate", type=reader(_rate), metavar="HZ", help="without a file: samples a second (50)")
     dataset.add_argument("--mcap", action="store_true", help="write each episode as .mcap too")
     _add_workers(dataset)
     dataset.add_argument(

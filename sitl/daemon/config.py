@@ -181,6 +181,16 @@ def _within(value: float, low: float, high: float, what: str) -> float:
     return value
 
 
+def parse_number(text: str, low: float, high: float, unit: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not low <= value <= high:
+        raise SettingError(f"'{text}' is not a number from {low:g} to {high:g} {unit}")
+    return value
+
+
 def parse_home(text: str) -> Home:
     lat, lon, alt, heading = _numbers(text, "LAT,LON,ALT_AMSL,HEADING")
     _within(lat, -90.0, 90.0, "latitude")

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from sitl.daemon.config import INSTANCE_MAX, SHARED_PORT, RunConfig, SettingError, Setup
+from sitl.daemon.config import INSTANCE_MAX, SHARED_PORT, RunConfig, SettingError, Setup, parse_number
 
 SPACING_MAX_M = 1000.0
 RATE_MAX_HZ = 100.0
@@ -17,27 +17,17 @@ def parse_count(text: str) -> int:
 
 
 def parse_spacing(text: str) -> float:
-    return _number(text, 0.1, SPACING_MAX_M, "m")
+    return parse_number(text, 0.1, SPACING_MAX_M, "m")
 
 
 def parse_rate(text: str) -> float:
-    return _number(text, 1.0, RATE_MAX_HZ, "Hz")
+    return parse_number(text, 1.0, RATE_MAX_HZ, "Hz")
 
 
 def parse_port(text: str) -> int:
     if not text.isdecimal() or not 0 < int(text) < 65536:
         raise SettingError(f"'{text}' is not a port from 1 to 65535")
     return int(text)
-
-
-def _number(text: str, low: float, high: float, unit: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not low <= value <= high:
-        raise SettingError(f"'{text}' is not a number from {low:g} to {high:g} {unit}")
-    return value
 
 
 def grid(count: int, spacing_m: float) -> list[tuple[float, float]]:

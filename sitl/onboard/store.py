@@ -1,9 +1,10 @@
 """Where parameters and the plan outlive the process."""
 
 import os
-import tempfile
 from pathlib import Path
 from typing import Protocol
+
+from sitl.atomic import atomically
 
 
 class Store(Protocol):
@@ -37,11 +38,7 @@ class MemoryStore:
 
 
 class FolderStore:
-    """A store of files in one folder, made when first written to.
-
-    A write goes to a temporary file that then takes the old one's place, so that a process killed at any moment
-    leaves the old content or the new.
-    """
+    """A store of files in one folder, made when first written to; who may read them, the umask says."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -53,15 +50,7 @@ class FolderStore:
             return None
 
     def write(self, name: str, data: bytes) -> None:
-        self.folder.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(prefix=f".{name}.", dir=self.folder)
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(data)
-            os.replace(temporary, self.folder / name)
-        except BaseException:
-            Path(temporary).unlink(missing_ok=True)
-            raise
+        atomically(self.folder / name, lambda to: to.write_bytes(data))
 
     def set_aside(self, name: str) -> None:
         path = self.folder / name

@@ -2,7 +2,6 @@
 
 import json
 import os
-import signal
 import subprocess
 import sys
 import time
@@ -10,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from interrupted import interrupted, program
 
 from gcs_tools.demo import simulator
 
@@ -92,29 +92,15 @@ def test_a_demo_whose_simulator_cannot_start_says_why() -> None:
 
 
 def test_ctrl_c_lands_the_vehicle_and_stops_the_simulator() -> None:
-    demo = subprocess.Popen(
-        [sys.executable, "-m", "gcs_tools.demo", "--speed", "5"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
-    try:
-        assert demo.stderr is not None
+    with program("gcs_tools.demo", "--speed", "5") as demo:
         said = ""
         while "armed" not in said:
             line = demo.stderr.readline()
             assert line, said
             said += line
         (child,) = children(demo.pid)
-        demo.send_signal(signal.SIGINT)
-        _, rest = demo.communicate(timeout=20)
-    finally:
-        demo.kill()
-        demo.wait()
-    assert demo.returncode == 130
+        _, rest = interrupted(demo)
     assert "asked the vehicle to land" in rest
-    assert "Traceback" not in rest
     assert not alive(child)
 
 

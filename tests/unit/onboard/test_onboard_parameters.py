@@ -1,6 +1,7 @@
 """The parameter registry: declared ranges, refusals, persistence."""
 
 import math
+import os
 
 import numpy as np
 import pytest
@@ -81,6 +82,16 @@ def test_values_outlive_the_process_and_kinds_of_vehicle_stay_apart(tmp_path) ->
     assert registry(FolderStore(tmp_path))["GAIN"] == float(np.float32(0.2))
     assert registry(FolderStore(tmp_path))["CHOICE"] == 1
     assert registry(FolderStore(tmp_path), namespace="two")["CHOICE"] == 3
+
+
+def test_what_is_stored_can_be_read_by_those_whom_the_umask_lets_and_leaves_nothing_else_behind(tmp_path) -> None:
+    before = os.umask(0o027)
+    try:
+        FolderStore(tmp_path / "state").write("parameters.json", b"{}")
+    finally:
+        os.umask(before)
+    [path] = (tmp_path / "state").iterdir()
+    assert (path.name, path.stat().st_mode & 0o777) == ("parameters.json", 0o640)
 
 
 def test_what_is_not_persistent_and_what_is_default_is_not_stored() -> None:
