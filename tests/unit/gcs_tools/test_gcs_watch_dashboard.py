@@ -298,3 +298,8 @@ def test_numbers_that_are_none_are_shown_as_they_come(value: float) -> None:
         air.fly(1.0)
         for size in ((80, 24), (140, 40)):
             air.screen(*size)
+
+
+def test_it_sleeps_while_nobody_is_heard() -> None:
+    air = Air().fly(0.02)
+    assert air.station.next_deadline == pytest.approx(air.wall_s + 1.0)

@@ -65,7 +65,8 @@ def test_the_end_of_a_scale_is_a_round_number() -> None:
 def test_a_counter_that_has_gone_round_is_not_taken_for_a_repetition() -> None:
     traffic, encoder, parser = Traffic(), codec.Encoder(1, 1), codec.Parser()
     for k in range(700):
-        for frame in parser.feed(encoder.encode(codec.message("EXTENDED_SYS_STATE"))):
+        always_alike, never = codec.message("EXTENDED_SYS_STATE"), codec.message("SYSTEM_TIME", time_boot_ms=k)
+        for frame in parser.feed(encoder.encode(never if k % 4 else always_alike)):
             traffic.hear(frame, k * 0.01)
     assert traffic.loss(7.0) == 0.0
 
