@@ -70,20 +70,22 @@ class Area(NamedTuple):
     def crossings(self, a: Level, b: Level) -> list[float]:
         """Shares of the straight way from a to b, 0 to 1, at which it meets the border."""
         way = b[0] - a[0], b[1] - a[1]
-        found = []
         if self.is_circle:
             from_centre = a[0] - self.corners_m[0][0], a[1] - self.corners_m[0][1]
             square = way[0] ** 2 + way[1] ** 2
             along = way[0] * from_centre[0] + way[1] * from_centre[1]
             root = along**2 - square * (from_centre[0] ** 2 + from_centre[1] ** 2 - self.radius_m**2)
-            if square > 0.0 and root >= 0.0:
-                found = [(-along + sign * math.sqrt(root)) / square for sign in (-1.0, 1.0)]
+            met = root >= 0.0 and square > 0.0
+            found = [(-along + sign * math.sqrt(root)) / square for sign in (-1.0, 1.0)] if met else []
         else:
-            for c, d in self._sides():
-                side, to = (d[0] - c[0], d[1] - c[1]), (c[0] - a[0], c[1] - a[1])
-                across = way[0] * side[1] - way[1] * side[0]
-                if across and 0.0 <= (to[0] * way[1] - to[1] * way[0]) / across <= 1.0:
-                    found.append((to[0] * side[1] - to[1] * side[0]) / across)
+            corners = np.array(self.corners_m)
+            side, to = corners - np.roll(corners, 1, axis=0), np.roll(corners, 1, axis=0) - a
+            across = way[0] * side[:, 1] - way[1] * side[:, 0]
+            side, to, across = side[across != 0.0], to[across != 0.0], across[across != 0.0]
+            of_side = (to[:, 0] * way[1] - to[:, 1] * way[0]) / across
+            found = ((to[:, 0] * side[:, 1] - to[:, 1] * side[:, 0]) / across)[
+                (of_side >= 0.0) & (of_side <= 1.0)
+            ].tolist()
         return [share for share in found if 0.0 < share < 1.0]
 
 
@@ -104,16 +106,20 @@ def areas(items: Sequence[Item], place: Callable[[Item], Vector | None]) -> list
     return found
 
 
-def first_outside(fence: Sequence[Area], places: Sequence[Level]) -> tuple[int, Area] | None:
-    """The first of the places that the fence shuts out, by index, and the area that it violates."""
+def verdicts(fence: Sequence[Area], places: Sequence[Level]) -> list[Area | None]:
+    """Of each place the area that it violates, None where it lies within the fence."""
+    found: list[Area | None] = [None] * len(places)
     if not fence or not places:
-        return None
+        return found
     violated = np.array([area.violated(np.array(places, dtype=float)) for area in fence])
     for k in np.flatnonzero(violated.any(axis=0)).tolist():
-        area = _shut_out(fence, violated[:, k].tolist())
-        if area is not None:
-            return k, area
-    return None
+        found[k] = _shut_out(fence, violated[:, k].tolist())
+    return found
+
+
+def first_outside(fence: Sequence[Area], places: Sequence[Level]) -> tuple[int, Area] | None:
+    """The first of the places that the fence shuts out, by index, and the area that it violates."""
+    return next(((k, area) for k, area in enumerate(verdicts(fence, places)) if area is not None), None)
 
 
 def _shut_out(fence: Sequence[Area], violated: Sequence[bool]) -> Area | None:
@@ -126,12 +132,20 @@ def _shut_out(fence: Sequence[Area], violated: Sequence[bool]) -> Area | None:
     return None if None in refusing.values() else next(iter(refusing.values()), None)
 
 
-def leaves(fence: Sequence[Area], a: Level, b: Level) -> tuple[float, Area] | None:
-    """Where the straight way between two places first lies outside: share of it, 0 to 1, and the area violated."""
-    borders = sorted({0.0, 1.0, *(share for area in fence for share in area.crossings(a, b))})
-    between = [(begin + end) / 2.0 for begin, end in pairwise(borders)]
-    found = first_outside(fence, [(a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1])) for s in between])
-    return (borders[found[0]], found[1]) if found is not None else None
+def leaves(fence: Sequence[Area], ways: Sequence[tuple[Level, Level]]) -> list[tuple[float, Area] | None]:
+    """Where each straight way first lies outside, the share of it gone there, 0 to 1, and the area violated."""
+    pieces: list[tuple[int, float]] = []  # of which way, and where it begins
+    middles: list[Level] = []
+    for k, (a, b) in enumerate(ways):
+        for begin, end in pairwise(sorted({0.0, 1.0, *(share for area in fence for share in area.crossings(a, b))})):
+            share = (begin + end) / 2.0
+            pieces.append((k, begin))
+            middles.append((a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])))
+    found: list[tuple[float, Area] | None] = [None] * len(ways)
+    for (k, begin), area in zip(pieces, verdicts(fence, middles), strict=True):
+        if area is not None and found[k] is None:
+            found[k] = begin, area
+    return found
 
 
 def summary(fence: Sequence[Area]) -> str:

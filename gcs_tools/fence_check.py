@@ -40,21 +40,40 @@ def along_items(plan: Uploaded, home: Home | None, way: Sequence[tuple[str, Vect
     has_home = plan.home is not None or any(item.frame in LOCAL_FRAMES for item in plan.fence or ())
     found = fence.first_outside(areas, [(0.0, 0.0)]) if has_home else None
     told = [f"home is {found[1].reason}: the vehicle refuses such a fence"] if found else []
-    for index, item in enumerate(plan.items):
-        outside = fence.first_outside(areas, _looked_at(item, home))
-        if outside is not None:
-            told.append(f"item {index} lies outside the fence: {outside[1].reason}: the vehicle doesn't start it")
-    for (a, begin), (b, end) in pairwise(way):
-        left = fence.leaves(areas, begin[:2], end[:2])
-        if left is not None and fence.first_outside(areas, [begin[:2], end[:2]]) is None:
+    return told + _items_outside(areas, plan, home) + _ways_outside(areas, way) + _rally_outside(areas, plan, home)
+
+
+def _items_outside(areas: list[fence.Area], plan: Uploaded, home: Home | None) -> list[str]:
+    looked_at = [(i, place) for i, item in enumerate(plan.items) for place in _looked_at(item, home)]
+    outside: dict[int, fence.Area] = {}  # by item: what its first such point violates
+    for (i, _), area in zip(looked_at, fence.verdicts(areas, [place for _, place in looked_at]), strict=True):
+        if area is not None:
+            outside.setdefault(i, area)
+    return [
+        f"item {i} lies outside the fence: {area.reason}: the vehicle doesn't start it" for i, area in outside.items()
+    ]
+
+
+def _ways_outside(areas: list[fence.Area], way: Sequence[tuple[str, Vector]]) -> list[str]:
+    """Of the ways whose both ends lie within."""
+    at_places = fence.verdicts(areas, [place[:2] for _, place in way])
+    within = [(a, b) for (a, p), (b, q) in pairwise(zip(way, at_places, strict=True)) if p is q is None]
+    told = []
+    for (a, b), left in zip(within, fence.leaves(areas, [(a[1][:2], b[1][:2]) for a, b in within]), strict=True):
+        if left is not None:
             share, area = left
-            at = tuple(u + share * (v - u) for u, v in zip(begin[:2], end[:2], strict=True))
-            told.append(f"the way from {a} to {b} is {area.reason} from {_named(at)} on: a breach in flight")
-    for index, item in enumerate(plan.rally or ()):
-        outside = fence.first_outside(areas, [p[:2] for p in [local_m(item, home)] if p is not None])
-        if outside is not None:
-            told.append(f"rally point {index} is {outside[1].reason}: Return doesn't lead there")
+            at = [u + share * (v - u) for u, v in zip(a[1][:2], b[1][:2], strict=True)]
+            told.append(f"the way from {a[0]} to {b[0]} is {area.reason} from {_named(at)} on: a breach in flight")
     return told
+
+
+def _rally_outside(areas: list[fence.Area], plan: Uploaded, home: Home | None) -> list[str]:
+    places = [(i, place[:2]) for i, item in enumerate(plan.rally or ()) if (place := local_m(item, home)) is not None]
+    return [
+        f"rally point {i} is {area.reason}: Return doesn't lead there"
+        for (i, _), area in zip(places, fence.verdicts(areas, [place for _, place in places]), strict=True)
+        if area is not None
+    ]
 
 
 def _looked_at(item: Item, home: Home | None) -> list[fence.Level]:

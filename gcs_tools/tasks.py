@@ -63,10 +63,8 @@ def _plan(args: argparse.Namespace) -> None:
 
     found = plan.load(args.mission)
     if args.to is None:
-        timeline.show(found)
-        leaves = timeline.objections(found)
-        if leaves:
-            raise ConfigError(f"{args.mission}: {leaves[0]}")
+        for objection in timeline.show(found):
+            raise ConfigError(f"{args.mission}: {objection}")
         return
     written = convert.convert(found, args.to, args.home)
     counts = [f"{len(written.items)} items"]

@@ -27,6 +27,7 @@ LIMITS = {
     "MPC_JERK_AUTO": 4.0,
 }
 _LAND_SLOW_M = 1.5
+_TOLD = 20  # objections
 # measured on missions/rectangle-mission.yaml: motors spun up; slowing down, contact felt and standing
 _LIFT_OFF_S, _TOUCH_DOWN_S = 1.4, 4.0
 _LANDS, _RETURNS, _DELAYS, _SPEED, _TAKES_OFF, _HOLDS = (21, 85), 20, (93, 112), 178, (22, 84), (16, 82)
@@ -143,15 +144,16 @@ def _name(command: int) -> str:
 
 
 def objections(plan: Plan) -> list[str]:
-    """What speaks against flying it within its own fence."""
+    """What speaks against flying it within its own fence; a streamed flight was judged when its file was read."""
     if isinstance(plan, Streamed):
-        return [text for text in [fence_check.along_reference(plan)] if text]
+        return []
     places = [(f"item {i}", row.place_m) for i, row in enumerate(rows(plan))]
     way = [("the start", (0.0, 0.0, 0.0)), *((name, place) for name, place in places if place is not None)]
     return fence_check.along_items(plan, plan.home or _first_place(plan), way)
 
 
-def show(plan: Plan, console: Console | None = None) -> None:
+def show(plan: Plan, console: Console | None = None) -> list[str]:
+    """Print it; what speaks against flying it."""
     console = console or Console()
     found: Sequence[Row] = rows(plan)
     console.print(f"{plan.name} · {plan.source}", markup=False, highlight=False)
@@ -168,7 +170,7 @@ def show(plan: Plan, console: Console | None = None) -> None:
         console.print(f"{length:.1f} m in {last:.1f} s", highlight=False)
     else:
         _show_limits(plan, length, last, console)
-    _show_fence(plan, console)
+    return _show_fence(plan, console)
 
 
 def _show_limits(plan: Uploaded, length: float, last: float, console: Console) -> None:
@@ -177,7 +179,7 @@ def _show_limits(plan: Uploaded, length: float, last: float, console: Console) -
     console.print(f"{len(plan.items)} items, {length:.1f} m, about {last:.0f} s, {stops} ({limits})", highlight=False)
 
 
-def _show_fence(plan: Plan, console: Console) -> None:
+def _show_fence(plan: Plan, console: Console) -> list[str]:
     """What the file says of fence and rally points, and whether the flight keeps to them."""
 
     def say(text: str) -> None:
@@ -186,10 +188,13 @@ def _show_fence(plan: Plan, console: Console) -> None:
     if plan.rally:
         say(f"{len(plan.rally)} rally point{'s' if len(plan.rally) > 1 else ''}")
     if not plan.fence:
-        return
+        return []
     home = (plan.home or _first_place(plan)) if isinstance(plan, Uploaded) else None
     areas = fence_check.areas_of(plan, home)
-    say(f"fence of {len(plan.fence)} items: {fence.summary(areas) or 'its places are not known without a home'}")
+    say(f"fence: {fence.summary(areas) or 'its places are not known without a home'}")
     found = objections(plan)
-    for text in found or ["every place and the whole way lie inside"] if areas else []:
+    for text in found[:_TOLD] or ["every place and the whole way lie inside"] if areas else []:
         say(text)
+    if len(found) > _TOLD:
+        say(f"and {len(found) - _TOLD} more")
+    return found

@@ -277,15 +277,29 @@ def test_the_begin_of_a_way_outside_is_where_the_border_is() -> None:
     areas = fence.areas(
         loaded(mission(ROOM + "  - {stay: outside, centre_m: [10, 1], radius_m: 2}\n")).fence or (), Item.place_m
     )
-    assert fence.leaves(areas, (0.0, -4.0), (20.0, -4.0)) is None
-    through = fence.leaves(areas, (0.0, 1.0), (20.0, 1.0))
+    ways = [((0.0, -4.0), (20.0, -4.0)), ((0.0, 1.0), (20.0, 1.0)), ((0.0, 0.0), (0.0, 10.0)), ((3.0, 3.0), (3.0, 3.0))]
+    within, through, out, nowhere = fence.leaves(areas, ways)
+    assert within is None
     assert through is not None
     assert through[0] == pytest.approx(8.0 / 20.0)
     assert through[1].reason == "inside the forbidden circle of fence item 4"
-    out = fence.leaves(areas, (0.0, 0.0), (0.0, 10.0))
     assert out is not None
     assert out[0] == pytest.approx(0.5)
-    assert fence.leaves(areas, (3.0, 3.0), (3.0, 3.0)) is None
+    assert nowhere is None
+
+
+def test_of_a_way_through_two_areas_the_first_is_named() -> None:
+    two = [f"  - {{stay: outside, centre_m: [{north}, 0], radius_m: 1}}\n" for north in (15, 5)]
+    [left] = fence.leaves(
+        fence.areas(loaded(mission("".join(two))).fence or (), Item.place_m), [((0.0, 0.0), (20.0, 0.0))]
+    )
+    assert left is not None
+    assert (left[0], left[1].item) == (pytest.approx(4.0 / 20.0), 1)
+
+
+def test_of_ways_to_and_from_an_item_outside_nothing_is_said_beside_the_item() -> None:
+    outside = loaded(mission(ROOM, ITEMS.replace("[20, 0, -5]", "[20, 6, -5]")))
+    assert len(timeline.objections(outside)) == 1
 
 
 def test_areas_have_the_size_that_they_have() -> None:
