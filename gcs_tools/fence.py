@@ -65,7 +65,8 @@ class Area(NamedTuple):
             for (n2, e2), (n1, e1) in self._sides():  # how often a ray to the north crosses them
                 if e1 != e2:
                     inside ^= ((e1 > east) != (e2 > east)) & (n1 + (n2 - n1) / (e2 - e1) * (east - e1) > north)
-        return inside != self.inclusion
+        wrong: NDArray[np.bool_] = inside != self.inclusion
+        return wrong
 
     def crossings(self, a: Level, b: Level) -> list[float]:
         """Shares of the straight way from a to b, 0 to 1, at which it meets the border."""

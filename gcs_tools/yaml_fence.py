@@ -38,7 +38,7 @@ class _RallyPoint(Struct, kw_only=True):
 
 
 # the field that tells what an entry of the fence is
-_KINDS = {"corners_m": _Polygon, "centre_m": _Circle, "return_m": _ReturnPoint}
+_KINDS: dict[str, Any] = {"corners_m": _Polygon, "centre_m": _Circle, "return_m": _ReturnPoint}
 
 
 def _item(command: int, p1: float, group: int, north: float, east: float, down: float = 0.0) -> Item:
