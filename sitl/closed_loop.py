@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sitl.control.cascade import Command, Memory, at_rest, cascade, direct_command, standing_command
-from sitl.control.gains import Gains, Settings
+from sitl.control.gains import Gains, Settings, settled
 from sitl.control.guidance import Guidance
 from sitl.control.reference import Reference, sample
 from sitl.estimation.alignment import starting
@@ -29,6 +29,7 @@ from sitl.model.sensors import (
     SensorState,
     baro,
     due,
+    fitted,
     gnss,
     magnetometer,
     observe,
@@ -162,7 +163,8 @@ def _standing(e: SensorState) -> bool:
 def _navigated(
     e: Estimate,
     t: Tuning,
-    plant: Plant,
+    p: Sensors,
+    receiver: float,
     errors: SensorState,
     s: State,
     noise: Array,
@@ -170,8 +172,11 @@ def _navigated(
     now_us: int,
     dt_us: int,
 ) -> Estimate:
-    """The estimate one control step later, with every reading that is due. off: the motors are."""
-    dt_s, p, receiver = dt_us * 1e-6, plant.sensors, plant.failures.gnss
+    """The estimate one control step later, with every reading that is due.
+
+    receiver: its failure. off: the motors are.
+    """
+    dt_s = dt_us * 1e-6
     e = predicted(e, errors.gyro_rad_s, errors.accel_m_s2, dt_s)
     if due(_COVARIANCE_HZ, now_us, dt_us):
         spread(e, t, max(1.0 / _COVARIANCE_HZ, dt_s))
@@ -189,18 +194,19 @@ def _navigated(
 
 
 @kernel
-def _motion(plant: Plant, s: State, wind_N: Vec3) -> tuple[Loads, Vec3, Vec3]:
+def _motion(a: Airframe, gear: Gear, s: State, wind_N: Vec3) -> tuple[Loads, Vec3, Vec3]:
     """The loads, the specific force in B and the acceleration in N that come of them [m/s²]."""
-    acting = loads(plant.airframe, plant.gear, s, wind_N)
+    acting = loads(a, gear, s, wind_N)
     force, moment = total(acting)
-    linear, _ = accelerations(plant.airframe, s, force, moment)
-    m = plant.airframe.mass_kg
+    linear, _ = accelerations(a, s, force, moment)
+    m = a.mass_kg
     return acting, (force[0] / m, force[1] / m, force[2] / m), linear
 
 
 @kernel
 def _trace(
-    plant: Plant,
+    airframe: Airframe,
+    gear: Gear,
     s: State,
     command: Command,
     reference: Reference,
@@ -210,7 +216,7 @@ def _trace(
     row: Array,
 ) -> None:
     """Fill one row of TRACE_COLUMNS."""
-    a, specific_force, linear = _motion(plant, s, wind_N)
+    a, specific_force, linear = _motion(airframe, gear, s, wind_N)
     row[0] = t_s
     for i in range(17):
         row[1 + i] = s[i]
@@ -268,6 +274,7 @@ def run_on(
     """`run`, but the covariance is `loop`'s own, changed in place."""
     plant, controller = plants[0], controllers[0]
     airframe, believed = loaded(plant.airframe), loaded(controller.airframe)
+    settings, sensors = settled(controller.settings), fitted(plant.sensors)
     s, gusts, errors, memory = loop.state, loop.gusts, loop.sensors, loop.memory
     estimating, noisy = controller.estimating > 0.0, noise.shape[0] > 0
     gusty = noisy and plant.wind.gust_m_s > 0.0
@@ -276,7 +283,7 @@ def run_on(
     dt_s = dt_us * 1e-6
     h_s = dt_s / plant.substeps
     wind_N = wind_velocity(plant.wind, gusts, -s.down_m)
-    nav = nav_of(estimate) if estimating else observe(plant.sensors, errors, s)
+    nav = nav_of(estimate) if estimating else observe(sensors, errors, s)
     command = standing_command(nav, 0.0)
     reference = sample(guidance.trajectory, start_us * 1e-6)
     for k in range(steps):
@@ -287,7 +294,7 @@ def run_on(
             speed = math.sqrt(rn * rn + re * re + rd * rd)
             gusts = step_gusts(plant.wind, gusts, -s.down_m, speed, (n[0], n[1], n[2]), dt_s)
             wind_N = wind_velocity(plant.wind, gusts, -s.down_m)
-        nav = nav_of(estimate) if estimating else observe(plant.sensors, errors, s)
+        nav = nav_of(estimate) if estimating else observe(sensors, errors, s)
         if guidance.effort == _OFF:
             command = standing_command(nav, 0.0)
             reference = sample(guidance.trajectory, t_s)
@@ -298,32 +305,30 @@ def run_on(
             command = direct_command(airframe, nav, guidance.actuation)
             reference = sample(guidance.trajectory, t_s)
         else:
-            command, memory, reference = cascade(
-                believed, controller.gains, controller.settings, guidance, memory, nav, t_s, dt_s
-            )
+            command, memory, reference = cascade(believed, controller.gains, settings, guidance, memory, nav, t_s, dt_s)
         actuators = ActuatorCommand(
             command.thrust_left_N, command.thrust_right_N, command.flap_left_rad, command.flap_right_rad
         )
         if trace.shape[0] > 0:
-            _trace(plant, s, command, reference, nav, wind_N, t_s, trace[k])
+            _trace(airframe, plant.gear, s, command, reference, nav, wind_N, t_s, trace[k])
         for _ in range(plant.substeps):
             driven = followed(plant.failures, airframe, s, actuators)
             s = step(airframe, plant.gear, plant.actuators, s, driven, wind_N, h_s)
         if estimating or noisy:
             felt = (0.0, 0.0, 0.0)
             if estimating:
-                _, felt, _ = _motion(plant, s, wind_N)
+                _, felt, _ = _motion(airframe, plant.gear, s, wind_N)
             n = noise[k, 3:] if noisy else quiet
-            errors = step_sensors(plant.sensors, errors, (s.p_rad_s, s.q_rad_s, s.r_rad_s), felt, n, dt_s)
+            errors = step_sensors(sensors, errors, (s.p_rad_s, s.q_rad_s, s.r_rad_s), felt, n, dt_s)
             if estimating:
-                off = guidance.effort == _OFF
+                off, receiver = guidance.effort == _OFF, plant.failures.gnss
                 now_us = start_us + (k + 1) * dt_us
-                estimate = _navigated(estimate, controller.tuning, plant, errors, s, n, off, now_us, dt_us)
+                estimate = _navigated(estimate, controller.tuning, sensors, receiver, errors, s, n, off, now_us, dt_us)
     if guidance.effort != _FLY and steps > 0:
         memory = at_rest(believed, believed.thrust_min_N)
-    acting, specific_force, linear = _motion(plant, s, wind_N)
+    acting, specific_force, linear = _motion(airframe, plant.gear, s, wind_N)
     observed = Observed(
-        nav_of(estimate) if estimating else observe(plant.sensors, errors, s),
+        nav_of(estimate) if estimating else observe(sensors, errors, s),
         command,
         reference,
         wind_N,

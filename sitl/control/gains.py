@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 from sitl.control.disturbance import Bandwidth
+from sitl.jit import kernel
 
 
 class Pid(NamedTuple):
@@ -66,3 +67,14 @@ class Settings(NamedTuple):
     thrust_recover_N: float  # the same while the nose is far off its target: thrust is what turns it
     braking_rad_s2: PerAxis  # angular accelerations that the actuators can brake a turn with, B
     lean_max_rad: float  # largest tilt of the thrust from the vertical that the position loops may ask for
+
+
+@kernel
+def settled(s: Settings) -> Settings:
+    """The settings in numbers of a kernel's own, as `sitl.model.airframe.loaded` has the airframe."""
+    return Settings(
+        s.feedforward_velocity, s.feedforward_acceleration, s.feedforward_inverse, s.quaternion_error,
+        s.velocity_max_m_s, s.acceleration_max_m_s2, s.velocity_d_tau_s, s.rate_d_tau_s, s.motor_tau_s, s.flap_tau_s,
+        Bandwidth(s.disturbance.force_rad_s, s.disturbance.moment_rad_s), s.slipstream_floor_N, s.thrust_floor_N,
+        s.thrust_recover_N, PerAxis(s.braking_rad_s2.x, s.braking_rad_s2.y, s.braking_rad_s2.z), s.lean_max_rad,
+    )  # fmt: skip

@@ -19,6 +19,7 @@ from sitl.estimation.error_state import (
     Array,
     Estimate,
     Tuning,
+    flat,
     turned,
 )
 from sitl.jit import kernel
@@ -29,41 +30,34 @@ _STILL_M_S, _STILL_RAD_S = 0.01, 0.001  # how still a vehicle that stands is tak
 
 
 @kernel
-def _fuse(P: Array, dx: Array, h: Array, innovation: float, variance: float) -> None:
-    """One scalar reading z = h·x + noise: `dx` (the errors found so far) and `P`, in place."""
-    ph, predicted, s = np.empty(ERRORS), 0.0, variance
-    for i in range(ERRORS):
-        total = 0.0
-        for j in range(ERRORS):
-            if h[j] != 0.0:
-                total += P[i, j] * h[j]
-        ph[i] = total
-        predicted += h[i] * dx[i]
-    for i in range(ERRORS):
-        s += h[i] * ph[i]
-    left = innovation - predicted
+def _fuse(P: Array, dx: Array, at: tuple[int, int, int], h: Vec3, innovation: float, variance: float) -> None:
+    """One scalar reading z = h₀ x[at₀] + h₁ x[at₁] + h₂ x[at₂] + noise: `dx` (the errors so far) and flat `P`."""
+    n, ph = ERRORS, np.empty(ERRORS)
+    for j in range(n):
+        ph[j] = h[0] * P[n * at[0] + j] + h[1] * P[n * at[1] + j] + h[2] * P[n * at[2] + j]  # P is symmetric
+    left = innovation - (h[0] * dx[at[0]] + h[1] * dx[at[1]] + h[2] * dx[at[2]])
+    s = variance + (h[0] * ph[at[0]] + h[1] * ph[at[1]] + h[2] * ph[at[2]])
     s = max(s, abs(left) * math.sqrt(s) / GATE)
-    for i in range(ERRORS):
+    for i in range(n):
         k = ph[i] / s
         dx[i] += k * left
-        for j in range(ERRORS):
-            P[i, j] -= k * ph[j]
+        for j in range(n):
+            P[n * i + j] -= k * ph[j]
 
 
 @kernel
-def _axis(h: Array, index: int) -> Array:
-    h[:] = 0.0
-    h[index] = 1.0
-    return h
+def _fuse_one(P: Array, dx: Array, at: int, innovation: float, variance: float) -> None:
+    """A reading of one error itself."""
+    _fuse(P, dx, (at, at, at), (1.0, 0.0, 0.0), innovation, variance)
 
 
 @kernel
 def _injected(e: Estimate, dx: Array) -> Estimate:
     """The solution with the errors found taken out of it."""
-    P = e.covariance
-    for i in range(ERRORS):  # rounding must not make it lopsided
+    P, n = flat(e.covariance), ERRORS
+    for i in range(n):  # rounding must not make it lopsided
         for j in range(i):
-            P[i, j] = P[j, i] = 0.5 * (P[i, j] + P[j, i])
+            P[n * i + j] = P[n * j + i] = 0.5 * (P[n * i + j] + P[n * j + i])
     p, v, bg, ba, rates, force = e.position_N, e.velocity_N, e.gyro_bias, e.accel_bias, e.rates_B, e.force_B
     return Estimate(
         (p[0] + dx[POSITION], p[1] + dx[POSITION + 1], p[2] + dx[POSITION + 2]),
@@ -74,27 +68,26 @@ def _injected(e: Estimate, dx: Array) -> Estimate:
         e.baro_offset_m + dx[BARO],
         (rates[0] - dx[GYRO], rates[1] - dx[GYRO + 1], rates[2] - dx[GYRO + 2]),
         (force[0] - dx[ACCEL], force[1] - dx[ACCEL + 1], force[2] - dx[ACCEL + 2]),
-        P,
+        e.covariance,
     )
 
 
 @kernel
 def with_gnss(e: Estimate, t: Tuning, position_N: Vec3, velocity_N: Vec3) -> Estimate:
     """A satellite fix: position [m] and velocity [m/s] in N."""
-    dx, h = np.zeros(ERRORS), np.empty(ERRORS)
+    P, dx = flat(e.covariance), np.zeros(ERRORS)
     for i in range(3):
         sigma = t.gnss_height_m if i == 2 else t.gnss_level_m
-        _fuse(e.covariance, dx, _axis(h, POSITION + i), position_N[i] - e.position_N[i], sigma * sigma)
-        _fuse(e.covariance, dx, _axis(h, VELOCITY + i), velocity_N[i] - e.velocity_N[i], t.gnss_velocity_m_s**2)
+        _fuse_one(P, dx, POSITION + i, position_N[i] - e.position_N[i], sigma * sigma)
+        _fuse_one(P, dx, VELOCITY + i, velocity_N[i] - e.velocity_N[i], t.gnss_velocity_m_s**2)
     return _injected(e, dx)
 
 
 @kernel
 def with_baro(e: Estimate, t: Tuning, height_m: float) -> Estimate:
     """The barometer's height above the start [m]; its slowly changing offset is part of the estimate."""
-    dx, h = np.zeros(ERRORS), np.zeros(ERRORS)
-    h[POSITION + 2], h[BARO] = -1.0, 1.0
-    _fuse(e.covariance, dx, h, height_m + e.position_N[2] - e.baro_offset_m, t.baro_m**2)
+    P, dx, at, h = flat(e.covariance), np.zeros(ERRORS), (POSITION + 2, BARO, BARO), (-1.0, 1.0, 0.0)
+    _fuse(P, dx, at, h, height_m + e.position_N[2] - e.baro_offset_m, t.baro_m**2)
     return _injected(e, dx)
 
 
@@ -106,12 +99,10 @@ def with_field(e: Estimate, t: Tuning, field_B: Vec3) -> Estimate:
     """
     north, east, down = rotate(e.q_NB, field_B)
     steep = down / max(math.sqrt(north * north + east * east), 0.1)
-    dx, h = np.zeros(ERRORS), np.zeros(ERRORS)
-    for i in range(3):
-        axis = (1.0 if i == 0 else 0.0, 1.0 if i == 1 else 0.0, 1.0 if i == 2 else 0.0)
-        turned_N = rotate(e.q_NB, axis)
-        h[ATTITUDE + i] = turned_N[2] - steep * turned_N[0]
-    _fuse(e.covariance, dx, h, -math.atan2(east, north), t.heading_rad**2)
+    x, y, z = rotate(e.q_NB, (1.0, 0.0, 0.0)), rotate(e.q_NB, (0.0, 1.0, 0.0)), rotate(e.q_NB, (0.0, 0.0, 1.0))
+    P, dx, at = flat(e.covariance), np.zeros(ERRORS), (ATTITUDE, ATTITUDE + 1, ATTITUDE + 2)
+    h = (x[2] - steep * x[0], y[2] - steep * y[0], z[2] - steep * z[0])
+    _fuse(P, dx, at, h, -math.atan2(east, north), t.heading_rad**2)
     return _injected(e, dx)
 
 
@@ -121,10 +112,10 @@ def at_rest(e: Estimate, t: Tuning, dt_s: float) -> Estimate:
 
     dt_s: between two readings of the IMU.
     """
-    dx, h = np.zeros(ERRORS), np.empty(ERRORS)
+    P, dx = flat(e.covariance), np.zeros(ERRORS)
     reading = t.gyro_noise_rad_s_rtHz**2 / dt_s + _STILL_RAD_S**2
     for i in range(3):
-        _fuse(e.covariance, dx, _axis(h, VELOCITY + i), -e.velocity_N[i], _STILL_M_S**2)
+        _fuse_one(P, dx, VELOCITY + i, -e.velocity_N[i], _STILL_M_S**2)
         # the reading with the bias taken off should be zero: what is left of it is bias
-        _fuse(e.covariance, dx, _axis(h, GYRO + i), e.rates_B[i], reading)
+        _fuse_one(P, dx, GYRO + i, e.rates_B[i], reading)
     return _injected(e, dx)

@@ -103,63 +103,56 @@ def predicted(e: Estimate, gyro_rad_s: Vec3, accel_m_s2: Vec3, dt_s: float) -> E
 
 
 @kernel
-def _put_skew(F: Array, row: int, column: int, v: Vec3, k: float) -> None:
-    """F[row:row+3, column:column+3] += k [v]×."""
-    F[row, column + 1] -= k * v[2]
-    F[row, column + 2] += k * v[1]
-    F[row + 1, column] += k * v[2]
-    F[row + 1, column + 2] -= k * v[0]
-    F[row + 2, column] -= k * v[1]
-    F[row + 2, column + 1] += k * v[0]
+def _cross(a: Vec3, b: Vec3) -> Vec3:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @kernel
-def _times(A: Array, B: Array, transposed: bool, out: Array) -> None:
-    """out = A B, or B Aᵀ; A is sparse."""
-    n = A.shape[0]
-    out[:, :] = 0.0
-    for i in range(n):
-        for k in range(n):
-            a = A[i, k]
-            if a != 0.0:
-                if transposed:
-                    for j in range(n):
-                        out[j, i] += a * B[j, k]
-                else:
-                    for j in range(n):
-                        out[i, j] += a * B[k, j]
+def flat(P: Array) -> Array:
+    """The covariance row after row: with a row's length in its indices, compiled code works on a whole row at once."""
+    return P.reshape(ERRORS * ERRORS)
+
+
+@kernel
+def _advanced(P: Array, tilting: tuple[Vec3, Vec3, Vec3], R: tuple[Vec3, Vec3, Vec3], w: Vec3, dt_s: float) -> None:
+    """P ← F P, P flat: rows added to others, so that the places where F is 0 or 1 cost nothing. tilting: −R [f]×."""
+    n = ERRORS
+    for j in range(n):
+        x, y, z = P[n * ATTITUDE + j], P[n * (ATTITUDE + 1) + j], P[n * (ATTITUDE + 2) + j]
+        for i in range(3):
+            a, b = tilting[i], R[i]
+            gained = dt_s * (
+                a[0] * x + a[1] * y + a[2] * z
+                - b[0] * P[n * ACCEL + j] - b[1] * P[n * (ACCEL + 1) + j] - b[2] * P[n * (ACCEL + 2) + j]
+            )  # fmt: skip
+            P[n * (POSITION + i) + j] += dt_s * (P[n * (VELOCITY + i) + j] + 0.5 * gained)
+            P[n * (VELOCITY + i) + j] += gained
+        P[n * ATTITUDE + j] -= dt_s * (w[1] * z - w[2] * y + P[n * GYRO + j])
+        P[n * (ATTITUDE + 1) + j] -= dt_s * (w[2] * x - w[0] * z + P[n * (GYRO + 1) + j])
+        P[n * (ATTITUDE + 2) + j] -= dt_s * (w[0] * y - w[1] * x + P[n * (GYRO + 2) + j])
 
 
 @kernel
 def spread(e: Estimate, t: Tuning, dt_s: float) -> None:
-    """The covariance `dt_s` later, in place: P ← F P Fᵀ + Q.
+    """The covariance `dt_s` later, in place: P ← F P Fᵀ + Q, where F P Fᵀ = F (F P)ᵀ as P is symmetric.
 
     δṗ = δv, δv̇ = −R [f]× δθ − R δb_a, δθ̇ = −[ω]× δθ − δb_g, to the first order in dt and the second for δp.
     """
-    P, F = e.covariance, np.eye(ERRORS)
-    columns = (rotate(e.q_NB, (1.0, 0.0, 0.0)), rotate(e.q_NB, (0.0, 1.0, 0.0)), rotate(e.q_NB, (0.0, 0.0, 1.0)))
-    f = e.force_B
+    P, f, n = flat(e.covariance), e.force_B, ERRORS
+    x, y, z = rotate(e.q_NB, (1.0, 0.0, 0.0)), rotate(e.q_NB, (0.0, 1.0, 0.0)), rotate(e.q_NB, (0.0, 0.0, 1.0))
+    R = ((x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2]))
+    tilting = (_cross(f, R[0]), _cross(f, R[1]), _cross(f, R[2]))  # row r of −R [f]× is f × r
+    _advanced(P, tilting, R, e.rates_B, dt_s)
+    for i in range(n):
+        for j in range(i):
+            P[n * i + j], P[n * j + i] = P[n * j + i], P[n * i + j]
+    _advanced(P, tilting, R, e.rates_B, dt_s)
     for i in range(3):
-        x, y, z = columns[0][i], columns[1][i], columns[2][i]
-        F[POSITION + i, VELOCITY + i] = dt_s
-        # row i of −R [f]×, and of −R
-        F[VELOCITY + i, ATTITUDE] = -dt_s * (y * f[2] - z * f[1])
-        F[VELOCITY + i, ATTITUDE + 1] = -dt_s * (z * f[0] - x * f[2])
-        F[VELOCITY + i, ATTITUDE + 2] = -dt_s * (x * f[1] - y * f[0])
-        F[VELOCITY + i, ACCEL], F[VELOCITY + i, ACCEL + 1], F[VELOCITY + i, ACCEL + 2] = -dt_s * x, -dt_s * y, -dt_s * z
-        F[ATTITUDE + i, GYRO + i] = -dt_s
-        for j in range(ATTITUDE, BARO):
-            F[POSITION + i, j] = 0.5 * dt_s * F[VELOCITY + i, j]
-    _put_skew(F, ATTITUDE, ATTITUDE, e.rates_B, -dt_s)
-    work = np.empty((ERRORS, ERRORS))
-    _times(F, P, False, work)
-    _times(F, work, True, P)
-    for i in range(3):
-        P[VELOCITY + i, VELOCITY + i] += t.accel_noise_m_s2_rtHz**2 * dt_s
-        P[ATTITUDE + i, ATTITUDE + i] += t.gyro_noise_rad_s_rtHz**2 * dt_s
-        P[GYRO + i, GYRO + i] += t.gyro_walk_rad_s2_rtHz**2 * dt_s
-        P[ACCEL + i, ACCEL + i] += t.accel_walk_m_s3_rtHz**2 * dt_s
-    P[BARO, BARO] += _BARO_DRIFT**2 * dt_s
+        P[(n + 1) * (VELOCITY + i)] += t.accel_noise_m_s2_rtHz**2 * dt_s
+        P[(n + 1) * (ATTITUDE + i)] += t.gyro_noise_rad_s_rtHz**2 * dt_s
+        P[(n + 1) * (GYRO + i)] += t.gyro_walk_rad_s2_rtHz**2 * dt_s
+        P[(n + 1) * (ACCEL + i)] += t.accel_walk_m_s3_rtHz**2 * dt_s
+    P[(n + 1) * BARO] += _BARO_DRIFT**2 * dt_s
 
 
 @kernel

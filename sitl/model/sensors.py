@@ -68,6 +68,17 @@ PERFECT = SensorState(_ZERO, _ZERO, _ZERO, _ZERO, 0.0, _ZERO, _ZERO)
 
 
 @kernel
+def fitted(p: Sensors) -> Sensors:
+    """The sensors in numbers of a kernel's own, as `sitl.model.airframe.loaded` has the airframe."""
+    return Sensors(
+        p.gyro_noise_rad_s_rtHz, p.gyro_walk_rad_s2_rtHz, p.gyro_bias_rad_s, p.accel_noise_m_s2_rtHz,
+        p.accel_walk_m_s3_rtHz, p.accel_bias_m_s2, p.gnss_rate_Hz, p.gnss_level_m, p.gnss_height_m,
+        p.gnss_velocity_m_s, p.gnss_wander_m, p.gnss_wander_s, p.baro_rate_Hz, p.baro_m, p.baro_wander_m,
+        p.baro_wander_s, p.mag_rate_Hz, p.mag, p.mag_bias, p.field_dip_rad,
+    )  # fmt: skip
+
+
+@kernel
 def _scaled(k: float, a: float, b: float, c: float) -> Vec3:
     return k * a, k * b, k * c
 
