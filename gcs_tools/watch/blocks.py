@@ -14,7 +14,7 @@ from sitl.mavlink.codec import mav
 
 _LANDED = ("", "on the ground", "in the air", "taking off", "landing")
 _MISSION = ("", "no mission", "not started", "under way", "paused", "complete")
-_STATES = {mav.MAV_STATE_CRITICAL: "FAILSAFE", mav.MAV_STATE_EMERGENCY: "EMERGENCY", 8: "FLIGHT TERMINATED"}
+STATES = {mav.MAV_STATE_CRITICAL: "FAILSAFE", mav.MAV_STATE_EMERGENCY: "EMERGENCY", 8: "FLIGHT TERMINATED"}
 _LABEL = 9
 _UNDER_WAY, _COMPLETE = 3, 5  # MISSION_STATE
 _SEVERE = (BAD, BAD, BAD, BAD, WARN, "cyan", "", DIM)
@@ -26,8 +26,8 @@ def header(seen: Seen, wall_s: float, width: int, frozen: bool) -> list[Text]:
     left = Text(" ").append(printable(v.name or "unnamed vehicle"), "bold").append(f" · system {seen.system}   ", DIM)
     left.append(f" {(v.mode or '?').upper()} ", "bold reverse cyan" if not lost else "reverse").append(" ")
     left.append(" ARMED " if v.armed else " disarmed ", "bold reverse yellow" if v.armed else DIM).append("  ")
-    if v.status in _STATES:
-        left.append(f" {_STATES[v.status]} ", "bold reverse red").append("  ")
+    if v.status in STATES:
+        left.append(f" {STATES[v.status]} ", "bold reverse red").append("  ")
     left.append(_LANDED[v.landed] if v.landed < len(_LANDED) else "")
     right = Text()
     if frozen:

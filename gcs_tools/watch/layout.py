@@ -173,7 +173,8 @@ def _line(place: int, seen: Seen, scene: Scene) -> Text:
     if lost:
         return text.append(f"LOST {duration(seen.age_s(scene.wall_s))}", BAD)
     loss = seen.traffic.loss(scene.wall_s)
-    return text.append("●" if not loss else f"−{100 * loss:.0f} %", GOOD if not loss else WARN)
+    text.append("●" if not loss else f"−{100 * loss:.0f} %", GOOD if not loss else WARN)
+    return text.append(f" {blocks.STATES[v.status]}" if v.status in blocks.STATES else "", BAD)
 
 
 def _told(x: float | None, digits: int) -> str:

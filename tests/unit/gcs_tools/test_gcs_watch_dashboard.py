@@ -186,6 +186,8 @@ def test_a_failsafe_is_shown() -> None:
     air = Air(flying()).fly(0.5)
     air.vehicles[0].send("HEARTBEAT", autopilot=12, custom_mode=4 << 16 | 5 << 24, system_status=5, base_mode=128)
     assert "RETURN ARMED FAILSAFE" in " ".join(air.fly(0.02).screen().split())
+    air.vehicles.append(StandIn(2))
+    assert row(air.fly(0.1).screen(100, 24), "▶ 1 return").endswith("FAILSAFE")
 
 
 def test_texts_are_coloured_by_severity_and_repeated_ones_stand_once() -> None:
