@@ -64,6 +64,7 @@ _NO_TRACE = np.zeros((0, len(TRACE_COLUMNS)))
 Pilot = Callable[[float, NavState, Guidance], Guidance]
 _NO_NOISE = np.zeros((0, NOISE_COLUMNS))
 _NOISE_US = 4_000_000  # as long as noise is drawn for at once, where many steps are run at once
+_NOISE_STEPS = 50  # that noise is drawn for at least
 _BATTERY_AHEAD_J = 1.0  # the battery is looked at so long before there is something to tell of it
 
 
@@ -270,6 +271,7 @@ class Vehicle:
             self._noise = noise[run:]
         self.now_us += run * self.step_us
         self.events.now_us = self.now_us
+        self._nav, self._feet_down = nav_of(self._observed_array), int(self._observed_array[-1])
         return run
 
     def _drawn(self, steps: int) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -277,7 +279,7 @@ class Vehicle:
         left = self._noise
         if len(left) >= steps:
             return left
-        fresh = self._random.standard_normal((steps - len(left), NOISE_COLUMNS))
+        fresh = self._random.standard_normal((max(steps - len(left), _NOISE_STEPS), NOISE_COLUMNS))
         return np.concatenate((left, fresh)) if len(left) else fresh
 
     def advance(self, until_us: int, trace: np.ndarray[Any, np.dtype[np.float64]] | None = None) -> None:
@@ -302,8 +304,7 @@ class Vehicle:
             self._build_constants()
             due = self.now_us >= self._next_tick_us
             if due or self.commander.changed:
-                seen = self._observed_array
-                self._guidance = self.commander.tick(self.now_us, nav_of(seen), int(seen[-1]))
+                self._guidance = self.commander.tick(self.now_us, self._nav, self._feet_down)
                 if due:
                     self._next_tick_us = self.now_us - self.now_us % TICK_US + TICK_US
                     self._drain_battery()
@@ -315,21 +316,21 @@ class Vehicle:
                 steps = self._calm_steps(steps, last_tick_us)
             guidance = self._guidance
             if self.pilot is not None:
-                steps, guidance = 1, self.pilot(self.now_us * 1e-6, nav_of(self._observed_array), guidance)
+                steps, guidance = 1, self.pilot(self.now_us * 1e-6, self._nav, guidance)
             row += self._run(steps, trace[row : row + steps] if trace is not None else _NO_TRACE, guidance)
             if long:
                 put_calm(self._calm, None)
                 if self.now_us >= self._next_tick_us + self.step_us:  # ticks were passed over
                     since_us = self.now_us % TICK_US
                     self._next_tick_us = self.now_us - since_us + (0 if since_us < self.step_us else TICK_US)
-        self.commander.observe(self.now_us, nav_of(self._observed_array), int(self._observed_array[-1]))
+        self.commander.observe(self.now_us, self._nav, self._feet_down)
 
     def _calm_steps(self, steps: int, last_tick_us: int) -> int:
         """How many steps may be run at once instead of `steps`; lays down the calm that ends them."""
         calm = None if self.restless or self.pilot is not None else self.commander.calm()
         if calm is None or calm.until_us <= self._next_tick_us:
             return steps
-        put_calm(self._calm, calm, int(self._observed_array[-1]), self._energy_quiet_J)
+        put_calm(self._calm, calm, self._feet_down, self._energy_quiet_J)
         end_us = min(last_tick_us, self._next_tick_us + _NOISE_US) if self._noisy else last_tick_us
         return max(steps, -(-(end_us - self.now_us) // self.step_us))
 

@@ -328,8 +328,9 @@ class Commander:
         if self._footing.watch(fix, intent) and intent.landing:
             heading = self._guide.reference(fix).heading_rad
             self._guide.put(rest_at(fix.nav.north_m, fix.nav.east_m, 0.0, heading))
-        long = self._footing.standing_s(fix.now_us) >= self._p["COM_DISARM_LAND"]
-        if self.standing and long and self._finished(intent.landing):
+        if not (self.standing and self._finished(intent.landing)):
+            return
+        if self._footing.standing_s(fix.now_us) >= self._p["COM_DISARM_LAND"]:
             self._disarm()
 
     def _finished(self, landing: bool) -> bool:

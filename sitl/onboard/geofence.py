@@ -99,7 +99,7 @@ class Geofence:
     def watch(self, fix: Fix, flying: bool, braking_m_s2: float) -> Violation | None:
         """Look where the vehicle is, or with GF_PREDICT where it can halt; a breach that begins now is returned."""
         self._airborne_N = fix.position_N if flying else None
-        if not flying and not self.breach.outside:
+        if not self.breach.outside and not (flying and self.present and self.active):
             return None
         violation = self.violation(_halt_N(fix, braking_m_s2) if self._p["GF_PREDICT"] else fix.position_N)
         was, self.breach = self.breach, self.breach._replace(outside=violation is not None)

@@ -79,12 +79,15 @@ class Tilt(NamedTuple):
     since_us: int | None = None
 
 
+_UPRIGHT = Tilt()
+
+
 def tilt(t: Tilt, now_us: int, nav: NavState, feet_down: int) -> Tilt:
     """The tilt now, from the one of the last tick. It ends only with the vehicle upright on its feet."""
     nose_down = 2.0 * (nav.qx * nav.qz - nav.qw * nav.qy)
     if nose_down <= TIPPED or nav.down_m <= -NEAR_GROUND_M:
         upright = nose_down < TIPPED and feet_down > 2
-        return Tilt(t.tipped_over and not upright)
+        return Tilt(True) if t.tipped_over and not upright else _UPRIGHT
     if math.hypot(nav.v_north_m_s, nav.v_east_m_s, nav.v_down_m_s) >= _TIPPED_M_S:
         return Tilt(t.tipped_over)
     since_us = now_us if t.since_us is None else t.since_us

@@ -26,6 +26,13 @@ def _or_zero(x: float) -> float:
     return 0.0 if math.isnan(x) else x
 
 
+def _jerk(x: float) -> float:
+    """Within bounds; none where an acceleration is missing."""
+    if -_JERK_MAX <= x <= _JERK_MAX:
+        return x
+    return 0.0 if math.isnan(x) else math.copysign(_JERK_MAX, x)
+
+
 class OffboardTarget(NamedTuple):
     """Where to be and how to move, in N and SI. NaN on an axis: that quantity does not bind there.
 
@@ -177,11 +184,8 @@ class Offboard:
         spacing = (stamp_us - self._stamp_us) * 1e-6
         if last is None or not _SPACING_S[0] <= spacing <= _SPACING_S[1]:
             return (0.0, 0.0, 0.0)
-        jerk = []
-        for old, new in zip(last.acceleration_N, target.acceleration_N, strict=True):
-            j = (new - old) / spacing
-            jerk.append(0.0 if math.isnan(j) else max(-_JERK_MAX, min(_JERK_MAX, j)))
-        return jerk[0], jerk[1], jerk[2]
+        (a_n, a_e, a_d), (b_n, b_e, b_d) = last.acceleration_N, target.acceleration_N
+        return _jerk((b_n - a_n) / spacing), _jerk((b_e - a_e) / spacing), _jerk((b_d - a_d) / spacing)
 
     def age_s(self, now_us: int) -> float:
         """Simulation time since the newest target arrived; inf if none ever did."""
@@ -218,6 +222,8 @@ class Offboard:
         if target is None:
             raise ValueError("there is no offboard target yet")
         now, stamp = now_us * 1e-6, max(self._stamp_us * 1e-6, now_us * 1e-6 - _CARRY_S)
+        if stamp <= now and self.places:
+            return self._told(target, stamp, now + _CARRY_S)
         c: list[tuple[float, ...]] = []
         start = min(stamp, now)
         early = stamp - start  # a stamp ahead of now: begin now, on the same polynomial
@@ -240,6 +246,20 @@ class Offboard:
         heading = target.heading_rad - early * rate if told else heading_rad - age * rate
         c.append((heading, rate, 0.0, 0.0, 0.0, 0.0))
         return Trajectory(np.array([start]), np.array([c]), max(stamp, now) + _CARRY_S)
+
+    def _told(self, t: OffboardTarget, start_s: float, end_s: float) -> Trajectory:
+        """That of a target which tells its place and is not ahead of its time: nothing has to be made up for it."""
+        self._held = [None, None, None]
+        (north, east, down), (j_n, j_e, j_d) = t.position_N, self._jerk
+        motion = t.velocity_N + t.acceleration_N
+        v_n, v_e, v_d, a_n, a_e, a_d = map(_or_zero, motion) if math.isnan(sum(motion)) else motion
+        c = (
+            north, v_n, a_n / 2.0, j_n / 6.0, 0.0, 0.0,
+            east, v_e, a_e / 2.0, j_e / 6.0, 0.0, 0.0,
+            down, v_d, a_d / 2.0, j_d / 6.0, 0.0, 0.0,
+            t.heading_rad, _or_zero(t.heading_rate_rad_s), 0.0, 0.0, 0.0, 0.0,
+        )  # fmt: skip
+        return Trajectory(np.array((start_s,)), np.array(c).reshape(1, 4, DEGREE + 1), end_s)
 
     @property
     def places(self) -> bool:

@@ -228,6 +228,15 @@ def test_a_vehicle_that_is_back_inside_may_breach_again() -> None:
     assert len(of_kind(vehicle, EventKind.FENCE)) == 2
 
 
+def test_a_breach_ends_with_the_fence_or_the_wish_to_keep_to_it() -> None:
+    for lift in (lambda v: v.plans.fence.replace([]), lambda v: v.parameters.set("GF_ACTION", 0.0)):
+        vehicle = leaves(1)
+        assert lift(vehicle) is None
+        after(vehicle, 0.1)
+        assert not vehicle.commander.geofence.breach.outside
+        assert vehicle.commander.geofence.breach.times == 1
+
+
 def test_with_prediction_the_vehicle_halts_within_the_fence() -> None:
     def furthest(vehicle: Vehicle) -> float:
         most = place(vehicle)[0]

@@ -84,6 +84,25 @@ def test_a_target_is_carried_forward_by_its_age() -> None:
     assert r.v_north_m_s == pytest.approx(2.1)
 
 
+sensible = st.one_of(st.floats(-50.0, 50.0), st.just(NAN))
+moving = st.tuples(sensible, sensible, sensible)
+
+
+@given(st.integers(700_000, 1_000_000), st.tuples(*(st.floats(-50.0, 50.0),) * 3), moving, moving, moving)
+def test_a_heading_told_or_in_force_makes_the_same_course(
+    stamp_us: int, p: tuple, v: tuple, before: tuple, a: tuple
+) -> None:
+    courses = []
+    for told in (NAN, 0.7):
+        o = offboard()
+        o.submit(OffboardTarget(stamp_us - 50_000, p, v, before, told), 950_000)
+        o.submit(OffboardTarget(stamp_us, p, v, a, told), 1_000_000)
+        courses.append(o.trajectory(1_000_000, 0.7, (0.0, 0.0, 0.0)))
+    one, other = courses
+    assert np.array_equal(one.coefficients, other.coefficients)
+    assert (one.start_s, one.end_s) == (other.start_s, other.end_s)
+
+
 @pytest.mark.parametrize("stamp_us", [None, 60_000_000, 0])
 def test_a_stamp_of_another_clock_means_now(stamp_us: int | None) -> None:
     o = offboard()
