@@ -121,7 +121,8 @@ class Seen:
         return self.chosen, self._scale, self._introductions
 
     def _ping(self) -> None:
-        if self.client.wall_s - self._ping_s >= PING_S:
+        """TIMESYNC names nobody: every vehicle at the port answers, so one asks for all."""
+        if self.chosen and self.client.wall_s - self._ping_s >= PING_S:
             self._ping_s = self.client.wall_s
             self.instruments.ping()
 

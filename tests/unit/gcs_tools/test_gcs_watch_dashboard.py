@@ -256,14 +256,15 @@ def test_the_vehicle_asked_for_is_waited_for_while_others_are_listed() -> None:
     assert "· system 9" in air.fly(2.0).screen()
 
 
-def test_one_heartbeat_a_second_goes_out_however_many_vehicles_there_are() -> None:
+@pytest.mark.parametrize("name", ["HEARTBEAT", "TIMESYNC"])
+def test_what_all_vehicles_hear_is_said_once_a_second_however_many_there_are(name: str) -> None:
     air = Air(*(StandIn(k) for k in range(1, 4))).fly(2.0)
-    parser, heard = codec.Parser(), 0
+    parser, said = codec.Parser(), 0
     for _ in range(100):
         air.wall_s += 0.02
         for data in air.station.poll(air.wall_s):
-            heard += sum(frame.name == "HEARTBEAT" for frame in parser.feed(data))
-    assert heard == 2
+            said += sum(frame.name == name for frame in parser.feed(data))
+    assert 1 <= said <= 2
 
 
 def test_a_vehicle_whose_clock_stands_still_is_shown_as_it_stands() -> None:
