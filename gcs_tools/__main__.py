@@ -298,6 +298,13 @@ _Raw = argparse.RawDescriptionHelpFormatter
 
 
 def main(argv: Sequence[str] | None = None) -> int:
+    try:
+        return _run(argv)
+    except KeyboardInterrupt:  # wherever it comes, while modules are loaded too
+        return 130
+
+
+def _run(argv: Sequence[str] | None) -> int:
     args = parser().parse_args(argv)
     from gcs_tools import tasks
     from gcs_tools.client import LinkError
@@ -315,8 +322,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 1
     except OSError as error:
         return _complain(name, f"{error.filename}: {error.strerror}" if error.filename else error, 2)
-    except KeyboardInterrupt:
-        return 130
     return 0
 
 

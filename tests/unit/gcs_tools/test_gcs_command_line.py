@@ -73,3 +73,14 @@ def test_the_default_connection_is_where_vehicles_send_to_ground_stations() -> N
 
 def test_the_command_line_offers_every_mode() -> None:
     assert set(MODES) == set(VEHICLE_MODES)
+
+
+def test_ctrl_c_is_quiet_while_the_tool_is_still_starting(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted() -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("gcs_tools.__main__.parser", interrupted)
+    assert main(["watch"]) == 130
+    assert capsys.readouterr() == ("", "")
