@@ -24,7 +24,9 @@ if TYPE_CHECKING:
 MESSAGE = struct.Struct("<BQ")  # number of the topic, simulation time [µs]
 
 BEFORE_BYTES = 1 << 20  # of frames from before the flight, some ten seconds: they show what led to the arming
-THIN_AT = 1 << 24  # bytes waiting for the pipe; beyond, control steps are left out
+THIN_BYTES = (
+    1 << 22
+)  # with so many waiting for the pipe every second control step is left out; twice as many: half the rest
 STRIDE_MAX = 1024
 
 
@@ -51,7 +53,6 @@ class Recorder:
         self._flight: str | None = None
         self._before: deque[bytes] = deque()
         self._before_bytes = 0
-        self._stride = 1
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -96,24 +97,17 @@ class Recorder:
 
     def steps(self, trace: "NDArray[np.float64]") -> None:
         """Control steps, a row each."""
-        self._adapt()
-        first = -self.steps_seen % self._stride
-        kept = trace[first :: self._stride]
+        stride = min(STRIDE_MAX, 1 << len(self.pipe.backlog) // THIN_BYTES)
+        kept = trace[-self.steps_seen % stride :: stride]
         self.steps_seen += len(trace)
         if len(kept) and self._put(STEPS, kept.tobytes()):
             self.steps_kept += len(kept)
-
-    def _adapt(self) -> None:
-        if len(self.pipe.backlog) > THIN_AT:
-            self._stride = min(STRIDE_MAX, self._stride * 2)
-        elif not self.pipe.backlog and self._stride > 1:
-            self._stride //= 2
 
     def end(self) -> None:
         if self.flight is not None:
             self._put(END, b"")
             self.pipe.closing[self.flight] = self.steps_kept, self.steps_seen
-            self._flight, self._stride = None, 1
+            self._flight = None
 
     def _put(self, kind: bytes, data: bytes) -> bool:
         return self.pipe.put(kind, self.instance, data)
