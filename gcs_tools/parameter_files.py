@@ -17,7 +17,6 @@ from gcs_tools.client import Client, LinkError, Script
 from gcs_tools.parameter import Parameter
 from sitl import strict_yaml
 from sitl.strict_yaml import ConfigError
-from sitl.vehicle_spec import load_gains
 
 LISTS = (".param", ".params", ".parm")
 
@@ -45,6 +44,8 @@ def read(path: Path) -> dict[str, Written]:
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path}: can't be read: {getattr(error, 'strerror', None) or 'not UTF-8 text'}") from None
     if re.search(r"^gains\s*:", text, re.MULTILINE):
+        from sitl.vehicle_spec import load_gains  # with the vehicle's model, which no other file needs
+
         return {
             name: Written(value, strict_yaml.line_of(text, f"gains.{name[:-2]}"))
             for name, value in load_gains(path).items()

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from sitl.frames import quaternion_to_yxz
 from sitl.geodesy import to_global
-from sitl.mavlink.wire import WireAttitude, body_vector_on_wire, wire_attitude
+from sitl.mavlink.attitude import WireAttitude, body_vector_on_wire, wire_attitude
 from sitl.model.airframe import Airframe
 from sitl.model.rigid_body import State
 from sitl.navigation import NavState

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 import time
@@ -78,10 +79,11 @@ def test_nobody_there_is_reported() -> None:
 
 
 def test_the_demo_starts_flies_and_stops_what_it_started() -> None:
-    done = run("gcs_tools.demo", str(MISSIONS / "hover.yaml"), "--speed", "10")
+    done = run("gcs_tools.demo", str(MISSIONS / "hover.yaml"), "--speed", "5")
     assert done.returncode == 0, done.stderr
     assert "MAE [m]" in done.stdout
-    assert "t = 32.0 s: disarmed" in done.stderr
+    [disarmed_s] = re.findall(r"t = ([\d.]+) s: disarmed", done.stderr)
+    assert 32.0 <= float(disarmed_s) < 34.0  # at five times real time a busy machine hears of it later
 
 
 def test_a_demo_whose_simulator_cannot_start_says_why() -> None:

@@ -1,5 +1,8 @@
 """The client's pieces: texts, one-shot commands, connections as they are written, the watch line."""
 
+import subprocess
+import sys
+
 import pytest
 from gcs_tools_stand_in import Pair, StandIn
 
@@ -201,3 +204,10 @@ def test_the_watch_line_shows_mode_place_and_angles() -> None:
     line = plain.line(client)
     for part in ("mode: hold, disarmed", "north 1.000 east 2.000 down -3.000 m", "95.00°", "11.00 N", "ready: yes"):
         assert part in line
+
+
+@pytest.mark.parametrize("module", ["fly", "tasks", "watch.run"])
+def test_a_client_starts_without_the_vehicles_compiler(module: str) -> None:
+    code = f"import sys, gcs_tools.{module}; print('numba' in sys.modules)"
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+    assert out.stdout == "False\n"

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sitl.frames import quaternion_from_321, quaternion_from_yxz, standing
-from sitl.mavlink import wire
+from sitl.mavlink import attitude, wire
 from sitl.navigation import NavState
 
 
@@ -17,30 +17,30 @@ def nav(q: tuple[float, float, float, float], rates: tuple[float, float, float] 
 
 @pytest.mark.parametrize("heading_deg", [-170, -90, 0, 45, 179])
 def test_upright_hover_reads_roll_and_pitch_zero_and_the_bellys_heading(heading_deg: float) -> None:
-    a = wire.wire_attitude(nav(standing(math.radians(heading_deg), math.pi / 2)))
+    a = attitude.wire_attitude(nav(standing(math.radians(heading_deg), math.pi / 2)))
     assert (a.roll, a.pitch) == pytest.approx((0.0, 0.0), abs=1e-12)
     assert a.yaw == pytest.approx(math.radians(heading_deg))
 
 
 def test_the_wires_roll_is_the_papers_yaw_and_its_yaw_minus_the_papers_roll() -> None:
     """Small angles about hover; φ turns about the nose, which points up: against the heading."""
-    a = wire.wire_attitude(nav(quaternion_from_yxz(0.02, math.pi / 2 + 0.03, 0.01)))
+    a = attitude.wire_attitude(nav(quaternion_from_yxz(0.02, math.pi / 2 + 0.03, 0.01)))
     assert (a.roll, a.pitch, a.yaw) == pytest.approx((0.01, 0.03, -0.02), abs=1e-3)
 
 
 def test_the_wires_rates_are_r_q_and_minus_p() -> None:
-    a = wire.wire_attitude(nav((1.0, 0.0, 0.0, 0.0), (0.1, 0.2, 0.3)))
+    a = attitude.wire_attitude(nav((1.0, 0.0, 0.0, 0.0), (0.1, 0.2, 0.3)))
     assert (a.rollspeed, a.pitchspeed, a.yawspeed) == (0.3, 0.2, -0.1)
 
 
 def test_level_forward_flight_reads_pitched_down_by_ninety_degrees() -> None:
-    a = wire.wire_attitude(nav(quaternion_from_321(0.0, 0.0, 0.5)))
+    a = attitude.wire_attitude(nav(quaternion_from_321(0.0, 0.0, 0.5)))
     assert a.pitch == pytest.approx(-math.pi / 2)
 
 
 def test_the_accelerometer_of_a_hovering_vehicle_reads_gravity_on_minus_z() -> None:
     """In hover the body's x points up, so the specific force is +g along it."""
-    assert wire.body_vector_on_wire((9.8, 0.1, 0.2)) == (0.2, 0.1, -9.8)
+    assert attitude.body_vector_on_wire((9.8, 0.1, 0.2)) == (0.2, 0.1, -9.8)
 
 
 @pytest.mark.parametrize(
