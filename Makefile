@@ -17,7 +17,7 @@ test: $(TESTED)
 	@$(BIN)/ruff format --check .
 	@$(BIN)/mypy sitl
 	@$(BIN)/lint-imports
-	@nice $(MAKE) --no-print-directory test-computed > $(COMPUTED) 2>&1 & computed=$$!; \
+	@nice -n 19 $(MAKE) --no-print-directory test-computed > $(COMPUTED) 2>&1 & computed=$$!; \
 	  $(MAKE) --no-print-directory test-flown; flown=$$?; \
 	  wait $$computed; computed=$$?; cat $(COMPUTED); [ $$flown = 0 ] && [ $$computed = 0 ]
 

@@ -24,7 +24,9 @@ SPEED = 10.0
 def connect() -> Iterator[tuple[str, ...]]:
     """A simulator of our own at ten times real time, and how to reach it."""
     with simulator("yawsitter", SPEED) as running:
-        yield ("--connect", f"udpout:127.0.0.1:{running.connection.port}", "--system", str(running.instance + 1))
+        to = ("--connect", f"udpout:127.0.0.1:{running.connection.port}", "--system", str(running.instance + 1))
+        gcs("param", "set", "COM_OF_LOSS_T", "10", *to)  # a second of a busy machine
+        yield to
 
 
 def run(module: str, *arguments: str) -> "subprocess.CompletedProcess[str]":
