@@ -27,7 +27,7 @@ NAMES = {
     "soak": "30 simulated hours of missions; 10 min, 3 hours with --quick",
     "swarm": "50 vehicles in one process at 1 × real time: processor time for each, deadlines; 1.5 min",
     "crossing": "50 vehicles' turn in compiled code, entered one by one and in one call",
-    "peers": "other simulators in turn with this one, those that benchmarks.peer_environments has installed; 6 min",
+    "peers": "other simulators in turn with this one, those that benchmarks.peer_environments has installed; 10 min",
     "costs": "one message, put, tick, crossing, record and turn of the daemon, in µs; half a minute",
     "native": "the compiled step beside the same arithmetic written by hand in C",
     "shares": "where the time of a simulated second goes",

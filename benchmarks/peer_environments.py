@@ -22,6 +22,7 @@ ENVIRONMENTS = {
     "jsbsim": Environment(("jsbsim==1.3.3",), "0.1 GB"),
     "rotorpy": Environment(("rotorpy==3.0.0",), "0.5 GB"),
     "pyflyt": Environment(("PyFlyt==0.29.0",), "0.8 GB"),
+    "udaan": Environment(("udaan==1.3.0",), "0.9 GB"),
     "crazyflow": Environment(("crazyflow==0.4.0", "jax==0.10.1"), "1.2 GB"),
     "rotorpy-batch": Environment(("rotorpy[batched]==3.0.0", "torch==2.14.1"), "5.9 GB: pip's torch brings CUDA"),
 }
