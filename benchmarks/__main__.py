@@ -30,6 +30,7 @@ NAMES = {
     "peers": "other simulators in turn with this one, those that benchmarks.peer_environments has installed; 10 min",
     "costs": "one message, put, tick, crossing, record and turn of the daemon, in µs; half a minute",
     "native": "the compiled step beside the same arithmetic written by hand in C",
+    "arithmetic": "operations of a control step's parts, counted, and their time",
     "shares": "where the time of a simulated second goes",
 }
 

@@ -23,7 +23,7 @@ from sitl.onboard.modes import Mode
 from sitl.onboard.offboard import OffboardTarget
 from sitl.onboard.plan import MissionItem
 from sitl.tally import NOTHING, tally
-from sitl.vehicle import Vehicle, load_vehicle
+from sitl.vehicle import NOISE_STEPS, Vehicle, load_vehicle
 
 STREAM_US = 20_000  # between targets, and between two crossings into compiled code
 AIRBORNE_S = 60.0  # of the rectangle: what the bare loop flies, before the landing
@@ -87,7 +87,8 @@ def fly_bare(flight: Bare, steps_at_once: int) -> float:
         steps = min(left, steps_at_once)
         put_calm(calm, Calm(1 << 52, Ground.NOTHING), int(seen[-1]), math.inf)
         if flight.noisy and len(noise) < steps:
-            noise = random.standard_normal((steps, NOISE_COLUMNS))
+            fresh = random.standard_normal((max(steps - len(noise), NOISE_STEPS), NOISE_COLUMNS))
+            noise = np.concatenate((noise, fresh))
         run = run_in_place(
             flight.plants, flight.controllers, guidance, loop, noise, now_us, flight.step_us, steps, _NO_TRACE, seen,
             calm, nothing, NOTHING,

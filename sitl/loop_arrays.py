@@ -15,7 +15,7 @@ from sitl.calm_array import passes
 from sitl.closed_loop import Controller, LoopState, Observed, Plant, run_on
 from sitl.control.cascade import Command, Memory
 from sitl.control.disturbance import Disturbance, Flaps
-from sitl.control.feedforward import Trim
+from sitl.control.feedforward import Course, Trim
 from sitl.control.guidance import Actuation, Guidance, Steering
 from sitl.control.reference import DEGREE, Reference, Trajectory
 from sitl.estimation.error_state import ERRORS, Estimate
@@ -29,7 +29,7 @@ from sitl.tally import TICK_US, sample
 
 Array = NDArray[np.float64]
 _GUSTS, _SENSORS, _ESTIMATE, _COVARIANCE, _MEMORY = 17, 22, 41, 64, 64 + ERRORS * ERRORS  # the state begins at 0
-LOOP_SIZE = _MEMORY + 51
+LOOP_SIZE = _MEMORY + 63
 OBSERVED_SIZE = 52
 _PIECES = 22  # of a guidance's array: where its trajectory's segments begin
 _NAV, _COMMAND, _REFERENCE = slice(0, 13), slice(13, 28), slice(28, 42)
@@ -64,10 +64,10 @@ def _estimate(x: Array, i: int) -> Estimate:
 def _memory(x: Array, i: int) -> Memory:
     return Memory(
         _vec(x, i), _vec(x, i + 3), _vec(x, i + 6), _vec(x, i + 9), _vec(x, i + 12), _vec(x, i + 15),
-        _trim(x, i + 18), _trim(x, i + 24), x[i + 30], x[i + 31],
-        Flaps(x[i + 32], x[i + 33]),
-        Disturbance(_vec(x, i + 34), _vec(x, i + 37), _vec(x, i + 40), _vec(x, i + 43), x[i + 46]),
-        x[i + 47], x[i + 48], x[i + 49], x[i + 50],
+        Course(_trim(x, i + 18), _trim(x, i + 24), _trim(x, i + 30)), _trim(x, i + 36), x[i + 42], x[i + 43],
+        Flaps(x[i + 44], x[i + 45]),
+        Disturbance(_vec(x, i + 46), _vec(x, i + 49), _vec(x, i + 52), _vec(x, i + 55), x[i + 58]),
+        x[i + 59], x[i + 60], x[i + 61], x[i + 62],
     )  # fmt: skip
 
 
@@ -122,16 +122,18 @@ def _put_memory(x: Array, i: int, m: Memory) -> None:
     _put3(x, i + 12, m.velocity_error_smoothed)
     _put3(x, i + 15, m.rate_error_smoothed)
     for k in range(6):
-        x[i + 18 + k] = m.reference_trim[k]
-        x[i + 24 + k] = m.command_trim[k]
-    x[i + 30], x[i + 31], x[i + 32], x[i + 33] = m.flow_left_N, m.flow_right_N, m.flaps.left_rad, m.flaps.right_rad
+        x[i + 18 + k] = m.reference_trims.before[k]
+        x[i + 24 + k] = m.reference_trims.now[k]
+        x[i + 30 + k] = m.reference_trims.after[k]
+        x[i + 36 + k] = m.command_trim[k]
+    x[i + 42], x[i + 43], x[i + 44], x[i + 45] = m.flow_left_N, m.flow_right_N, m.flaps.left_rad, m.flaps.right_rad
     d = m.disturbance
-    _put3(x, i + 34, d.acceleration_N)
-    _put3(x, i + 37, d.angular_B)
-    _put3(x, i + 40, d.velocity_N)
-    _put3(x, i + 43, d.rates_B)
-    x[i + 46] = d.observing
-    x[i + 47], x[i + 48], x[i + 49], x[i + 50] = m.thrust_short, m.roll_short, m.pitch_short, m.yaw_short
+    _put3(x, i + 46, d.acceleration_N)
+    _put3(x, i + 49, d.angular_B)
+    _put3(x, i + 52, d.velocity_N)
+    _put3(x, i + 55, d.rates_B)
+    x[i + 58] = d.observing
+    x[i + 59], x[i + 60], x[i + 61], x[i + 62] = m.thrust_short, m.roll_short, m.pitch_short, m.yaw_short
 
 
 @kernel

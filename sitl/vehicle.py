@@ -64,7 +64,7 @@ _NO_TRACE = np.zeros((0, len(TRACE_COLUMNS)))
 Pilot = Callable[[float, NavState, Guidance], Guidance]
 _NO_NOISE = np.zeros((0, NOISE_COLUMNS))
 _NOISE_US = 4_000_000  # as long as noise is drawn for at once, where many steps are run at once
-_NOISE_STEPS = 50  # that noise is drawn for at least
+NOISE_STEPS = 250  # drawn at once where few are run: a call for ten costs a quarter more
 _BATTERY_AHEAD_J = 1.0  # the battery is looked at so long before there is something to tell of it
 
 
@@ -279,7 +279,7 @@ class Vehicle:
         left = self._noise
         if len(left) >= steps:
             return left
-        fresh = self._random.standard_normal((max(steps - len(left), _NOISE_STEPS), NOISE_COLUMNS))
+        fresh = self._random.standard_normal((max(steps - len(left), NOISE_STEPS), NOISE_COLUMNS))
         return np.concatenate((left, fresh)) if len(left) else fresh
 
     def advance(self, until_us: int, trace: np.ndarray[Any, np.dtype[np.float64]] | None = None) -> None:

@@ -15,10 +15,12 @@ typedef struct {
 } Settings;
 
 typedef struct { double pitch, lean, thrust, flap, slope, residual; } Trim;
+typedef struct { Trim before, now, after; } Course;
 
 typedef struct {
     Vec position_integral, velocity_integral, attitude_integral, rate_integral, velocity_smoothed, rate_smoothed;
-    Trim reference_trim, command_trim;
+    Course reference_trims;
+    Trim command_trim;
     double flow_left, flow_right, flap_left, flap_right;
     Vec acceleration, angular, velocity_seen, rates_seen;
     double observing, thrust_short, roll_short, pitch_short, yaw_short;
@@ -113,12 +115,12 @@ static inline double balance(const Airframe *a, Vec force, Vec air, double momen
     return gz - i.z - f.z - -area * a->n.flap_lift * flap;
 }
 
-static inline Trim refined(const Airframe *a, Vec force, Vec air, double moment, Trim start, int fresh) {
+static inline Trim refined(const Airframe *a, Vec force, Vec air, double moment, Trim start, double slope) {
     Trim x, ahead;
     x.residual = balance(a, force, air, moment, start.pitch, &x, start.thrust);
     x.lean = atan2(force.y, x.lean);
-    x.slope = start.slope;
-    if (fresh) {
+    x.slope = slope;
+    if (isnan(slope)) {
         x.slope = (balance(a, force, air, moment, start.pitch + STEP, &ahead, start.thrust) - x.residual) / STEP;
         if (fabs(x.slope) < 1.0) x.slope = x.slope >= 0.0 ? 1.0 : -1.0;
     }
@@ -133,12 +135,11 @@ static inline void needed(const Airframe *a, const Reference *r, double h, Vec *
     *force = heading_frame(heading, f), *air = heading_frame(heading, v);
 }
 
-static inline Trim reference_needs(const Airframe *a, const Reference *r, Trim start, Vec *rates, Vec *moment) {
+static inline Course reference_needs(const Airframe *a, const Reference *r, Course start, Vec *rates, Vec *moment) {
     Vec f, v, fb, vb, fa, va;
     needed(a, r, 0.0, &f, &v), needed(a, r, -LOOK, &fb, &vb), needed(a, r, LOOK, &fa, &va);
-    Trim now = refined(a, f, v, 0.0, refined(a, f, v, 0.0, start, 1), 0);
-    Trim before = refined(a, fb, vb, 0.0, now, 0), after = refined(a, fa, va, 0.0, now, 0);
-    before = refined(a, fb, vb, 0.0, before, 0), after = refined(a, fa, va, 0.0, after, 0);
+    Trim now = refined(a, f, v, 0.0, start.now, NAN);
+    Trim before = refined(a, fb, vb, 0.0, start.before, now.slope), after = refined(a, fa, va, 0.0, start.after, now.slope);
     double pitch_rate = (after.pitch - before.pitch) / (2.0 * LOOK), lean_rate = (after.lean - before.lean) / (2.0 * LOOK);
     double pitching = (after.pitch - 2.0 * now.pitch + before.pitch) / (LOOK * LOOK);
     double leaning = (after.lean - 2.0 * now.lean + before.lean) / (LOOK * LOOK);
@@ -146,7 +147,7 @@ static inline Trim reference_needs(const Airframe *a, const Reference *r, Trim s
     *rates = rotate_back(about_z(now.lean), turn);
     rates->z += lean_rate;
     *moment = (Vec){0.0, a->n.jyy * pitching, a->n.jzz * leaning};
-    return now;
+    return (Course){before, now, after};
 }
 
 /* disturbance observer */
@@ -279,15 +280,16 @@ static inline Outputs cascade(
 
     Vec rates_ff = {0.0, 0.0, 0.0}, moment_ff = {0.0, 0.0, 0.0};
     if (s->ff_inverse > 0.0) {
-        m->reference_trim = reference_needs(a, ref, m->reference_trim, &rates_ff, &moment_ff);
+        m->reference_trims = reference_needs(a, ref, m->reference_trims, &rates_ff, &moment_ff);
     } else {
         Vec f0, v0;
         needed(a, ref, 0.0, &f0, &v0);
-        m->reference_trim = refined(a, f0, v0, 0.0, refined(a, f0, v0, 0.0, m->reference_trim, 1), 0);
+        Trim now = refined(a, f0, v0, 0.0, m->reference_trims.now, NAN);
+        m->reference_trims = (Course){now, now, now};
     }
     moment_ff.x -= a->n.jxx * m->angular.x, moment_ff.y -= a->n.jyy * m->angular.y, moment_ff.z -= a->n.jzz * m->angular.z;
     Vec level_force = heading_frame(ref->heading, force), level_air = heading_frame(ref->heading, nav->v);
-    m->command_trim = refined(a, level_force, level_air, moment_ff.y, m->command_trim, 1);
+    m->command_trim = refined(a, level_force, level_air, moment_ff.y, m->command_trim, NAN);
     double half = 0.5 * m->command_trim.pitch;
     Quat target = multiply(multiply(about_z(ref->heading), (Quat){cos(half), 0.0, sin(half), 0.0}),
                            about_z(m->command_trim.lean));

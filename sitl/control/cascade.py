@@ -13,7 +13,7 @@ from sitl.control.attitude import (
     rate_command,
 )
 from sitl.control.disturbance import Disturbance, Flaps, none, observed
-from sitl.control.feedforward import Trim, heading_frame, invert, reference_needs, refined
+from sitl.control.feedforward import Course, Trim, heading_frame, invert, reference_needs, refined
 from sitl.control.flow import flow_at
 from sitl.control.gains import Gains, Settings
 from sitl.control.guidance import Actuation, Guidance
@@ -46,7 +46,7 @@ class Memory(NamedTuple):
     rate_integral: Vec3
     velocity_error_smoothed: Vec3
     rate_error_smoothed: Vec3
-    reference_trim: Trim  # of the reference, where the next inversion starts
+    reference_trims: Course  # of the reference, where the next inversion starts
     command_trim: Trim
     flow_left_N: float  # thrust as it shapes the slipstream, after the motors' lag
     flow_right_N: float
@@ -84,8 +84,8 @@ def at_rest(a: Airframe, thrust_each_N: float) -> Memory:
     zero = (0.0, 0.0, 0.0)
     weight = a.mass_kg * GRAVITY_M_S2
     hover = invert(a, (0.0, 0.0, -weight), zero, 0.0, 0.5 * math.pi, weight, 8)
-    t = thrust_each_N
-    return Memory(zero, zero, zero, zero, zero, zero, hover, hover, t, t, Flaps(0.0, 0.0), none(), 0.0, 0.0, 0.0, 0.0)
+    course, t = Course(hover, hover, hover), thrust_each_N
+    return Memory(zero, zero, zero, zero, zero, zero, course, hover, t, t, Flaps(0.0, 0.0), none(), 0.0, 0.0, 0.0, 0.0)
 
 
 @kernel
@@ -234,7 +234,7 @@ def cascade(
     # body rates and moment that the reference itself needs
     steering = guidance.steering
     ahead = s.feedforward_inverse > 0.0 and steering.steered == 0.0
-    now, rates_ff, moment_ff = reference_needs(a, ref, m.reference_trim, ahead)
+    course, rates_ff, moment_ff = reference_needs(a, ref, m.reference_trims, ahead)
     if steering.steered > 0.0:
         rates_ff = (steering.p_rad_s, steering.q_rad_s, steering.r_rad_s)
     moment_ff = (
@@ -250,7 +250,7 @@ def cascade(
         heading_frame(ref.heading_rad, velocity[0], velocity[1], velocity[2]),
         moment_ff[1],
         m.command_trim,
-        True,
+        math.nan,
     )
     target = attitude_of(ref.heading_rad, trim.pitch_rad, trim.lean_rad)
     along_nose_N = rotate_back(q_NB, force_N)[0]
@@ -301,7 +301,7 @@ def cascade(
         rate_integral,
         velocity_smoothed,
         rate_smoothed,
-        now,
+        course,
         trim,
         _spun_up(m.flow_left_N, x.thrust_left_N, motor_gain),
         _spun_up(m.flow_right_N, x.thrust_right_N, motor_gain),

@@ -27,6 +27,14 @@ class Trim(NamedTuple):
     residual_N: float  # of that balance before the last pass
 
 
+class Course(NamedTuple):
+    """The trims that the reference needs now, and _LOOK_S before and after."""
+
+    before: Trim
+    now: Trim
+    after: Trim
+
+
 @kernel
 def _balance(
     a: Airframe, force: Vec3, air: Vec3, moment_y: float, pitch: float, thrust: float
@@ -50,15 +58,15 @@ def _balance(
 
 
 @kernel
-def refined(a: Airframe, force: Vec3, air: Vec3, moment_y: float, start: Trim, fresh_slope: bool) -> Trim:
+def refined(a: Airframe, force: Vec3, air: Vec3, moment_y: float, start: Trim, slope_N_rad: float) -> Trim:
     """One Newton pass from `start` toward the trim that gives `force` at air velocity `air`; see `invert`.
 
-    Enough where `start` is the solution of a moment ago. Without `fresh_slope` the start's slope serves again, at
-    half of the cost.
+    Enough where `start` is the solution of a moment ago. slope_N_rad: of the balance, where that of a trim nearby will
+    do; nan: found afresh, at twice the cost.
     """
     residual, lean, thrust, flap = _balance(a, force, air, moment_y, start.pitch_rad, start.thrust_N)
-    slope = start.slope_N_rad
-    if fresh_slope:
+    slope = slope_N_rad
+    if math.isnan(slope):
         ahead, _, _, _ = _balance(a, force, air, moment_y, start.pitch_rad + _STEP, start.thrust_N)
         slope = (ahead - residual) / _STEP
         if abs(slope) < 1.0:
@@ -78,7 +86,7 @@ def invert(
     """
     trim = Trim(pitch_rad, 0.0, thrust_N, 0.0, 1.0, 0.0)
     for _ in range(passes):
-        trim = refined(a, force, air, moment_y, trim, True)
+        trim = refined(a, force, air, moment_y, trim, math.nan)
     return trim
 
 
@@ -115,26 +123,24 @@ def _carried(r: Reference, h: float) -> Reference:
 
 
 @kernel
-def reference_needs(a: Airframe, r: Reference, start: Trim, ahead: bool) -> tuple[Trim, Vec3, Vec3]:
-    """(trim, body rates [rad/s], moment [N·m, B]) that the reference itself needs; both zero unless looked `ahead`.
+def reference_needs(a: Airframe, r: Reference, start: Course, ahead: bool) -> tuple[Course, Vec3, Vec3]:
+    """(trims, body rates [rad/s], moment [N·m, B]) that the reference itself needs; both zero unless looked `ahead`.
 
-    Rates and moment are those of its trim's attitude, from its trim now, a moment ago and a moment on.
+    Rates and moment are those of its trim's attitude, from its trim now, a moment ago and a moment on. Each goes one
+    Newton pass on from where it was a control step ago (`start`).
     """
     zero = (0.0, 0.0, 0.0)
     force, air = _needed(a, r)
-    now = refined(a, force, air, 0.0, refined(a, force, air, 0.0, start, True), False)
+    now = refined(a, force, air, 0.0, start.now, math.nan)
     if not ahead:
-        return now, zero, zero
-    # pass by pass, so that a processor can work on both at once
-    force_before, air_before = _needed(a, _carried(r, -_LOOK_S))
-    force_after, air_after = _needed(a, _carried(r, _LOOK_S))
-    before = refined(a, force_before, air_before, 0.0, now, False)
-    after = refined(a, force_after, air_after, 0.0, now, False)
-    before = refined(a, force_before, air_before, 0.0, before, False)
-    after = refined(a, force_after, air_after, 0.0, after, False)
+        return Course(now, now, now), zero, zero
+    force, air = _needed(a, _carried(r, -_LOOK_S))
+    before = refined(a, force, air, 0.0, start.before, now.slope_N_rad)
+    force, air = _needed(a, _carried(r, _LOOK_S))
+    after = refined(a, force, air, 0.0, start.after, now.slope_N_rad)
     pitch_rate = (after.pitch_rad - before.pitch_rad) / (2.0 * _LOOK_S)
     lean_rate = (after.lean_rad - before.lean_rad) / (2.0 * _LOOK_S)
     pitching = (after.pitch_rad - 2.0 * now.pitch_rad + before.pitch_rad) / (_LOOK_S * _LOOK_S)
     leaning = (after.lean_rad - 2.0 * now.lean_rad + before.lean_rad) / (_LOOK_S * _LOOK_S)
     rates = rates_of(now.lean_rad, now.pitch_rad, r.heading_rate_rad_s, pitch_rate, lean_rate)
-    return now, rates, (0.0, a.jyy_kg_m2 * pitching, a.jzz_kg_m2 * leaning)
+    return Course(before, now, after), rates, (0.0, a.jyy_kg_m2 * pitching, a.jzz_kg_m2 * leaning)
