@@ -20,7 +20,7 @@ from sitl.jit import kernel
 from sitl.model.airframe import Airframe, Gear, loaded
 from sitl.model.derivative import ActuatorCommand, Actuators, Loads, loads, total
 from sitl.model.failures import SOUND, Failures, followed, heard, misplaced_m
-from sitl.model.integrate import step
+from sitl.model.integrate import apply_ideal_actuators, step_from
 from sitl.model.rigid_body import State, accelerations
 from sitl.model.sensors import (
     NOISES,
@@ -194,13 +194,12 @@ def _navigated(
 
 
 @kernel
-def _motion(a: Airframe, gear: Gear, s: State, wind_N: Vec3) -> tuple[Loads, Vec3, Vec3]:
-    """The loads, the specific force in B and the acceleration in N that come of them [m/s²]."""
-    acting = loads(a, gear, s, wind_N)
+def _motion(a: Airframe, s: State, acting: Loads) -> tuple[Vec3, Vec3]:
+    """The specific force in B and the acceleration in N that come of the loads [m/s²]."""
     force, moment = total(acting)
     linear, _ = accelerations(a, s, force, moment)
     m = a.mass_kg
-    return acting, (force[0] / m, force[1] / m, force[2] / m), linear
+    return (force[0] / m, force[1] / m, force[2] / m), linear
 
 
 @kernel
@@ -216,7 +215,8 @@ def _trace(
     row: Array,
 ) -> None:
     """Fill one row of TRACE_COLUMNS."""
-    a, specific_force, linear = _motion(airframe, gear, s, wind_N)
+    a = loads(airframe, gear, s, wind_N)
+    specific_force, linear = _motion(airframe, s, a)
     row[0] = t_s
     for i in range(17):
         row[1 + i] = s[i]
@@ -278,7 +278,9 @@ def run_on(
     s, gusts, errors, memory = loop.state, loop.gusts, loop.sensors, loop.memory
     estimating, noisy = controller.estimating > 0.0, noise.shape[0] > 0
     gusty = noisy and plant.wind.gust_m_s > 0.0
-    estimate = loop.estimate
+    estimate, lag = loop.estimate, plant.actuators
+    # what acts at a step's end acts at the next one's begin, unless the wind changes or an actuator jumps between
+    known, lagging = False, lag.motor_tau_s > 0.0 and lag.flap_tau_s > 0.0
     quiet = np.zeros(NOISES)
     dt_s = dt_us * 1e-6
     h_s = dt_s / plant.substeps
@@ -313,11 +315,18 @@ def run_on(
             _trace(airframe, plant.gear, s, command, reference, nav, wind_N, t_s, trace[k])
         for _ in range(plant.substeps):
             driven = followed(plant.failures, airframe, s, actuators)
-            s = step(airframe, plant.gear, plant.actuators, s, driven, wind_N, h_s)
+            s = apply_ideal_actuators(airframe, lag, s, driven)
+            if not known:
+                acting = loads(airframe, plant.gear, s, wind_N)
+            force, moment = total(acting)
+            s = step_from(airframe, plant.gear, lag, s, driven, wind_N, h_s, force, moment)
+            known = False
         if estimating or noisy:
             felt = (0.0, 0.0, 0.0)
             if estimating:
-                _, felt, _ = _motion(airframe, plant.gear, s, wind_N)
+                acting = loads(airframe, plant.gear, s, wind_N)
+                felt, _ = _motion(airframe, s, acting)
+                known = lagging and not gusty
             n = noise[k, 3:] if noisy else quiet
             errors = step_sensors(sensors, errors, (s.p_rad_s, s.q_rad_s, s.r_rad_s), felt, n, dt_s)
             if estimating:
@@ -326,7 +335,9 @@ def run_on(
                 estimate = _navigated(estimate, controller.tuning, sensors, receiver, errors, s, n, off, now_us, dt_us)
     if guidance.effort != _FLY and steps > 0:
         memory = at_rest(believed, believed.thrust_min_N)
-    acting, specific_force, linear = _motion(airframe, plant.gear, s, wind_N)
+    if not known:
+        acting = loads(airframe, plant.gear, s, wind_N)
+    specific_force, linear = _motion(airframe, s, acting)
     observed = Observed(
         nav_of(estimate) if estimating else observe(sensors, errors, s),
         command,

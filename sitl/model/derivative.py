@@ -123,9 +123,17 @@ def total(x: Loads) -> tuple[Vec3, Vec3]:
 
 @kernel
 def derivative(a: Airframe, g: Gear, lag: Actuators, s: State, command: ActuatorCommand, wind_N: Vec3) -> State:
-    """d/dt of the state (as a State whose fields are rates); q̇ = ½ q ⊗ ω."""
+    """d/dt of the state (as a State whose fields are rates)."""
     force, moment = total(loads(a, g, s, wind_N))
-    linear, angular = accelerations(a, s, force, moment)
+    return rates_of_change(a, lag, s, command, force, moment)
+
+
+@kernel
+def rates_of_change(
+    a: Airframe, lag: Actuators, s: State, command: ActuatorCommand, force_B: Vec3, moment_B: Vec3
+) -> State:
+    """`derivative` where all forces but gravity and all moments are known; q̇ = ½ q ⊗ ω."""
+    linear, angular = accelerations(a, s, force_B, moment_B)
     p, q, r = s.p_rad_s, s.q_rad_s, s.r_rad_s
     rotor_rate = 1.0 / lag.motor_tau_s if lag.motor_tau_s > 0.0 else 0.0
     flap_rate = 1.0 / lag.flap_tau_s if lag.flap_tau_s > 0.0 else 0.0

@@ -4,7 +4,7 @@ import math
 
 from sitl.jit import kernel
 from sitl.model.airframe import Airframe, Gear
-from sitl.model.derivative import ActuatorCommand, Actuators, derivative
+from sitl.model.derivative import ActuatorCommand, Actuators, derivative, loads, rates_of_change, total
 from sitl.model.propulsion import rotor_speed
 from sitl.model.rigid_body import State, moved
 from sitl.quaternion import Vec3
@@ -39,7 +39,17 @@ def normalised(s: State) -> State:
 def step(a: Airframe, g: Gear, lag: Actuators, s: State, command: ActuatorCommand, wind_N: Vec3, h_s: float) -> State:
     """The state `h_s` seconds later under a constant command and wind."""
     s = apply_ideal_actuators(a, lag, s, command)
-    k1 = derivative(a, g, lag, s, command, wind_N)
+    force, moment = total(loads(a, g, s, wind_N))
+    return step_from(a, g, lag, s, command, wind_N, h_s, force, moment)
+
+
+@kernel
+def step_from(
+    a: Airframe, g: Gear, lag: Actuators, s: State, command: ActuatorCommand, wind_N: Vec3, h_s: float,
+    force_B: Vec3, moment_B: Vec3,
+) -> State:  # fmt: skip
+    """`step` where what acts in `s`, whose ideal actuators are at their command, is known: the `total` of its loads."""
+    k1 = rates_of_change(a, lag, s, command, force_B, moment_B)
     k2 = derivative(a, g, lag, moved(s, 0.5 * h_s, k1), command, wind_N)
     k3 = derivative(a, g, lag, moved(s, 0.5 * h_s, k2), command, wind_N)
     k4 = derivative(a, g, lag, moved(s, h_s, k3), command, wind_N)
