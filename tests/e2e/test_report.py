@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import pytest
 from daemon_process import ROOT, Client, Daemon
+from mcap.reader import make_reader
 
 pytestmark = pytest.mark.e2e
 
@@ -112,12 +113,23 @@ def test_an_mcap_that_was_cut_off_or_damaged_is_read_as_far_as_it_goes(recorded:
     assert 0.4 * whole_s < told["flight"]["duration_s"] < 0.6 * whole_s
     assert f"of {len(data) // 2}, there it is broken or cut off" in told["damage"][0]
     changed = bytearray(data)
-    for k in range(len(data) * 3 // 4, len(data) * 3 // 4 + 200):
+    middle = middle_of_a_chunk(recorded.mcap, 0.7)
+    for k in range(middle, middle + 200):
         changed[k] ^= 0x55
     cut.write_bytes(changed)
     told = report(cut)
     assert 0.6 * whole_s < told["flight"]["duration_s"] < 0.8 * whole_s
     assert len(told["damage"]) == 1
+
+
+def middle_of_a_chunk(path: Path, share: float) -> int:
+    """Where messages stand, so far into the file: between chunks are indexes, of which no message depends."""
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    size = path.stat().st_size
+    chunk = min(summary.chunk_indexes, key=lambda c: abs(c.chunk_start_offset - share * size))
+    return int(chunk.chunk_start_offset + chunk.chunk_length // 2)
 
 
 def test_a_mission_that_was_not_flown_is_refused(recorded: Recorded) -> None:
