@@ -21,13 +21,12 @@ test: $(TESTED)
 	  $(MAKE) --no-print-directory test-flown; flown=$$?; \
 	  wait $$computed; computed=$$?; cat $(COMPUTED); [ $$flown = 0 ] && [ $$computed = 0 ]
 
-# what flies in real time, and beside it, in the time that leaves, what computes and what draws; then once more without
-# compiling
+# what flies in real time, and beside it, in the time that leaves, what computes; then once more without compiling
 test-flown: $(TESTED)
-	@$(BIN)/python -m pytest -m "e2e and not browser"
+	@$(BIN)/python -m pytest -m e2e
 
 test-computed: $(TESTED)
-	@$(BIN)/python -m pytest -m "browser or not e2e"
+	@$(BIN)/python -m pytest -m "not e2e"
 	@NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -m "not e2e and not compiled" tests/unit/model tests/unit/control tests/unit/estimation tests/validation
 
 bench: $(TESTED)

@@ -9,7 +9,7 @@ import pytest
 from browser import Viewer, chromium, looking_at, needs_browser, row_of, text_of, until
 from daemon_process import BOOT_LIMIT_S, Client, Daemon, free_instance, mavlink
 
-pytestmark = [pytest.mark.e2e, pytest.mark.browser, needs_browser]
+pytestmark = [pytest.mark.e2e, needs_browser]
 
 INSTANCES = range(110, 120)
 SPEED = 10
