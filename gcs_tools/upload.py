@@ -69,7 +69,7 @@ def hand_over(client: Client, plan: Plan) -> Script[list[str]]:
             if items is None:
                 continue
             old = yield from download(client, kind)
-            if old == tuple(map(_as_carried, items)):
+            if old == tuple(map(as_carried, items)):
                 continue
             yield from upload(client, items, kind)
             replaced.append((kind, old))
@@ -125,8 +125,8 @@ def _counted(items: Sequence[Item], kind: int) -> str:
     return f"{len(items)} {name}{'' if len(items) == 1 else 's'}"
 
 
-def _as_carried(item: Item) -> Item:
-    """With the precision of the link."""
+def as_carried(item: Item) -> Item:
+    """With the precision of the link: its floats have 32 bits."""
     p1, p2, p3, p4, z = map(float32, (item.param1, item.param2, item.param3, item.param4, item.z))
     return item._replace(param1=p1, param2=p2, param3=p3, param4=p4, z=z)
 

@@ -21,6 +21,7 @@ MODES = {
     "offboard": 6 << 16,
 }
 MODE_NAMES = {number: name for name, number in MODES.items()}
+LANDED = {1: "on the ground", 2: "in the air", 3: "taking off", 4: "landing"}  # MAV_LANDED_STATE that is told
 SEVERITIES = ("emergency", "alert", "critical", "error", "warning", "notice", "info", "debug")
 _UNKNOWN_U16 = 0xFFFF
 _TEXT_PIECE = 50  # a STATUSTEXT of this length goes on in the next

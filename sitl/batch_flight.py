@@ -25,6 +25,7 @@ from gcs_tools.flight import (
 from gcs_tools.lockstep import TURN_US
 from gcs_tools.plan import FRAME_LOCAL_NED, FRAME_MISSION, Item, Plan, Streamed, Uploaded
 from gcs_tools.reference import ZERO, TimedPoint, Waypoints
+from gcs_tools.upload import as_carried
 from sitl import tally
 from sitl.closed_loop import TRACE_COLUMNS
 from sitl.mavlink.wire import float32
@@ -303,6 +304,5 @@ def _counts(plan: Plan) -> tuple[int | None, int | None]:
 
 def _stored(item: Item, kind: int, first: bool) -> MissionItem:
     """The item of a plan of that MAV_MISSION_TYPE as the vehicle stores it when it comes over the link."""
-    p1, p2, p3, p4, z = map(float32, (item.param1, item.param2, item.param3, item.param4, item.z))
-    current, more = int(first and kind == 0), item.autocontinue
-    return MissionItem(item.frame, item.command, current, more, p1, p2, p3, p4, item.x, item.y, z, kind)
+    frame, command, p1, p2, p3, p4, x, y, z, more = as_carried(item)
+    return MissionItem(frame, command, int(first and kind == 0), more, p1, p2, p3, p4, x, y, z, kind)

@@ -13,13 +13,12 @@ from gcs_tools.params import Parameter
 from gcs_tools.report.link_quality import quality
 from gcs_tools.report.log import Event, Log, Status, bundled_defaults
 from gcs_tools.report.tlog_frames import Stamped, frames
-from gcs_tools.vehicle_state import SEVERITIES, VehicleState
+from gcs_tools.vehicle_state import LANDED, SEVERITIES, VehicleState
 from sitl.frames import body_quaternion, quaternion_to_yxz
 from sitl.mavlink.codec import Frame, mav
 from sitl.strict_yaml import ConfigError
 
 _RESTART_S = 1.0  # back in the vehicle's time: it has started anew
-_LANDED = (None, "on the ground", "in the air", "taking off", "landing")
 _AUTOPILOT = 1
 _QUIET = (mav.MAV_CMD_SET_MESSAGE_INTERVAL, mav.MAV_CMD_REQUEST_MESSAGE)  # commands not worth an entry
 _TARGET_IGNORES_POSITION = 0b111
@@ -150,7 +149,7 @@ class _Reader:
     def _status(self) -> None:
         v, landed = self._state, self._state.landed
         assert self._t_s is not None
-        where = _LANDED[landed] if landed < len(_LANDED) else None
+        where = LANDED.get(landed)
         self._log.note_status(Status(self._t_s, v.mode, v.armed if v.mode else None, where))
 
     def _text(self, m: Any) -> None:

@@ -2,7 +2,7 @@
 
 from rich.text import Text
 
-from gcs_tools.vehicle_state import SEVERITIES
+from gcs_tools.vehicle_state import LANDED, SEVERITIES
 from gcs_tools.vehicle_state import Text as Told
 from gcs_tools.watch import gauges
 from gcs_tools.watch.gauges import printable
@@ -12,7 +12,6 @@ from gcs_tools.watch.seen import Seen
 from gcs_tools.watch.traffic import total
 from sitl.mavlink.codec import mav
 
-_LANDED = ("", "on the ground", "in the air", "taking off", "landing")
 _MISSION = ("", "no mission", "not started", "under way", "paused", "complete")
 STATES = {mav.MAV_STATE_CRITICAL: "FAILSAFE", mav.MAV_STATE_EMERGENCY: "EMERGENCY", 8: "FLIGHT TERMINATED"}
 _LABEL = 9
@@ -28,7 +27,7 @@ def header(seen: Seen, wall_s: float, width: int, frozen: bool) -> list[Text]:
     left.append(" ARMED " if v.armed else " disarmed ", "bold reverse yellow" if v.armed else DIM).append("  ")
     if v.status in STATES:
         left.append(f" {STATES[v.status]} ", "bold reverse red").append("  ")
-    left.append(_LANDED[v.landed] if v.landed < len(_LANDED) else "")
+    left.append(LANDED.get(v.landed, ""))
     right = Text()
     if frozen:
         right.append(" DRAWING PAUSED ", "reverse").append(" ")

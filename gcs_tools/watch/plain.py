@@ -4,10 +4,9 @@ import math
 
 from gcs_tools.client import Client, Script
 from gcs_tools.link import UdpLink
-from gcs_tools.vehicle_state import VehicleState
+from gcs_tools.vehicle_state import LANDED, VehicleState
 
 LINE_S = 1.0
-_LANDED = ("", "on the ground", "in the air", "taking off", "landing")
 
 
 def until(client: Client, seconds: float) -> Script[None]:
@@ -45,7 +44,7 @@ def rows(client: Client) -> list[tuple[str, str]]:
 
 
 def _place(v: VehicleState) -> str:
-    where = _LANDED[v.landed] if v.landed < len(_LANDED) else ""
+    where = LANDED.get(v.landed)
     return f", {where}" if where else ""
 
 

@@ -1,7 +1,6 @@
 """The viewer in a process of its own and a real headless Chromium that looks at it, for the tests in this folder."""
 
 import contextlib
-import ctypes
 import io
 import os
 import shutil
@@ -25,7 +24,6 @@ FLAGS = (
 START_LIMIT_S = 30.0
 LIMIT_S = 20.0
 SIZE = (1280, 720)
-_PR_CAPBSET_DROP, _CAP_SYS_NICE = 24, 23  # linux/prctl.h, linux/capability.h
 
 
 def _why_not() -> str:
@@ -103,22 +101,12 @@ def chromium() -> Iterator[Any]:
     """A headless browser with nothing in it."""
     from playwright.sync_api import sync_playwright
 
-    _keep_priority()
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=list(FLAGS))
         try:
             yield browser
         finally:
             browser.close()
-
-
-def _keep_priority() -> None:
-    """Let nothing that is started from here on raise its own priority, as Chromium does where it is root's.
-
-    It would take the processor from flights in real time that other tests watch meanwhile.
-    """
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_CAPBSET_DROP, _CAP_SYS_NICE, 0, 0, 0)
 
 
 @contextlib.contextmanager
